@@ -38,6 +38,11 @@ class World:
     @property
     def closed(self) -> bool:
         """Whether the world is closed."""
+    @property
+    def time_ns(self) -> int:
+        """Simulated time [ns], settable; part of what `become_copy_of` copies."""
+    @time_ns.setter
+    def time_ns(self, value: int) -> None: ...
     def _step(
         self, dt: float, velocity_iterations: int, position_iterations: int
     ) -> tuple[list[int], list[int]] | None: ...
@@ -1728,6 +1733,20 @@ class OldManifold:
     def tangent_impulses(self) -> npt.NDArray[np.float64]:
         """Impulse along the surface at each point [N s], shape (k,)."""
 
+def changed_contents(entries: Sequence[tuple[Any, ...]], missing: object) -> list[int]:
+    """Returns the indices of the objects whose contents are not the same objects as earlier.
+
+    Args:
+        entries: For each object a tuple: the object; a copy of its `__dict__`, or None if it has none;
+            the names of attributes that are ignored; the descriptors of its slots; a list of their
+            values; a copy of its items, None if it is not a container. The items of a dict are in a
+            dict.
+        missing: Value of a slot that is not set.
+
+    Raises:
+        ValueError: An entry has another number of members.
+    """
+
 class JobQueue:
     """The ordered jobs of a world: controllers, crowds, and callbacks at the rate of a clock.
 
@@ -1926,13 +1945,55 @@ class AgentBatch:
             ValueError: Two agents have the same world, their numbers of readings differ, or a range finder
                 measures intensities.
         """
-    def perform(
+    def replace(
+        self, row: int, agent: tuple[PhysicsBody, Controller, Touches, RangeFinder]
+    ) -> None:
+        """Replaces an agent by one of another world, which has no permission.
+
+        Args:
+            row: Index of the agent.
+            agent: As for the constructor.
+
+        Raises:
+            IndexError: There is no such agent.
+            ValueError: As for the constructor.
+        """
+    def permit(self, row: int) -> None:
+        """Permits to step the world of an agent without any code in between.
+
+        The permission ends with `JobQueue.interrupt` of the world. To be called before the caller examines
+        whether there is such code, so that later changes withdraw the permission.
+
+        Args:
+            row: Index of the agent.
+
+        Raises:
+            IndexError: There is no such agent.
+        """
+    def withdraw(self, row: int) -> None:
+        """Withdraws the permission of an agent.
+
+        Args:
+            row: Index of the agent.
+
+        Raises:
+            IndexError: There is no such agent.
+        """
+    def not_permitted(self, steps: npt.ArrayLike) -> list[int]:
+        """Returns the agents without a permission.
+
+        Args:
+            steps: Agents that are examined, shape (n,).
+
+        Raises:
+            ValueError: The array has another shape.
+        """
+    def start(
         self,
         run: tuple[int, int, int, float, int, int, bool, bool],
         steps: npt.ArrayLike,
         observes: npt.ArrayLike,
         velocities: npt.ArrayLike,
-        times: npt.ArrayLike,
         noises: npt.ArrayLike,
         poses: npt.ArrayLike,
         pose_rates: npt.ArrayLike,
@@ -1940,19 +2001,20 @@ class AgentBatch:
         ranges: npt.ArrayLike,
         touched: npt.ArrayLike,
         num_threads: int,
-    ) -> list[Any]:
-        """Sets the commands of agents, performs steps of their worlds, and observes them.
+    ) -> None:
+        """Sets the commands of agents, and begins to step their worlds and to observe them.
 
-        All arrays are C-contiguous, with a row for each agent. The results do not depend on the number of
+        Other threads do this until `finish`. Meanwhile these worlds and the arrays must not be used, except
+        for the rows of agents that neither step nor are observed. All arrays are C-contiguous, with a row for each agent. The results do not depend on the number of
         threads.
 
         Args:
-            run: The steps, as `Run`; each world has a time of its own.
+            run: The steps, as `Run`; each world has a time of its own, which it advances if the steps are
+                complete.
             steps: Whether the world of the agent steps, shape (n,).
             observes: Whether the agent is observed, after its steps, shape (n,).
             velocities: Commands (forward, sideways, omega), or (speed, 0, steering angle) for a drive that is
                 steered [m/s, rad/s, rad], shape (n, 3).
-            times: Simulated times of the worlds [ns], shape (n,).
             noises: Stream and number of the update of each scan, shape (n, 2).
             poses: Receives (x, y, theta) of the bodies in the world frame, shape (n, 3).
             pose_rates: Receives the velocities of their origins (vx, vy, omega), shape (n, 3).
@@ -1961,14 +2023,26 @@ class AgentBatch:
             touched: Receives whether an agent touched anything in its steps, shape (n,).
             num_threads: Maximum number of threads; 0 for one per core.
 
+        Raises:
+            ValueError: An array has another shape, a number is out of range, or `finish` was not called.
+            StaleHandleError: A world is closed.
+            WorldLockedError: A world is in use.
+        """
+    def stop_threads(self) -> None:
+        """Ends the threads of the batch; `start` creates new ones.
+
+        Raises:
+            ValueError: `finish` was not called.
+        """
+    def finish(self) -> list[Any]:
+        """Completes what `start` has begun.
+
         Returns:
             Agents whose steps are not complete, with what `JobQueue.run` returns or raises. They are not
             observed.
 
         Raises:
-            ValueError: An array has another shape, or a number is out of range.
-            StaleHandleError: A world is closed.
-            WorldLockedError: A world is in use.
+            ValueError: `start` was not called.
         """
 
 def boundary_edges(mask: npt.ArrayLike, resolution: float) -> npt.NDArray[np.float32]:

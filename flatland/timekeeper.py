@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 NANOSECONDS = 1_000_000_000
 
 MIN_STEP_SIZE = 1e-6
@@ -10,23 +12,41 @@ MAX_STEP_SIZE = 1000.0
 """Largest step of the Box2D solver [s]."""
 
 
+class SimulatedTime(Protocol):
+    """What has the simulated time: a `flatland.physics.PhysicsWorld`.
+
+    Attributes:
+        time_ns: Simulated time [ns].
+    """
+
+    time_ns: int
+
+
+class _OwnTime:
+    """The simulated time of a timekeeper without a world."""
+
+    __slots__ = ("time_ns",)
+
+    def __init__(self) -> None:
+        self.time_ns = 0
+
+
 class Timekeeper:
     """The simulated time and the step size.
 
     Attributes:
-        sim_time_ns: Simulated time since the start [ns].
         step_size: Simulated time of one step [s].
         step_size_ns: Simulated time of one step [ns], exact.
     """
 
-    # Plain attributes, because they are read many times in every step.
-    __slots__ = ("sim_time_ns", "step_size", "step_size_ns")
+    __slots__ = ("_time", "step_size", "step_size_ns")
 
-    def __init__(self, step_size: float = 0.005) -> None:
-        """Initializes the time to 0.
+    def __init__(self, step_size: float = 0.005, time: SimulatedTime | None = None) -> None:
+        """Creates a timekeeper.
 
         Args:
             step_size: Simulated time of one step [s], from 1e-6 to 1000; rounded to nanoseconds.
+            time: The physics world, which has the time; None for a time of its own.
 
         Raises:
             ValueError: The step size is out of range or NaN.
@@ -37,7 +57,16 @@ class Timekeeper:
             )
         self.step_size_ns = round(step_size * NANOSECONDS)
         self.step_size = self.step_size_ns / NANOSECONDS
-        self.sim_time_ns = 0
+        self._time = _OwnTime() if time is None else time
+
+    @property
+    def sim_time_ns(self) -> int:
+        """Simulated time since the start [ns]; settable."""
+        return self._time.time_ns
+
+    @sim_time_ns.setter
+    def sim_time_ns(self, time_ns: int) -> None:
+        self._time.time_ns = time_ns
 
     @property
     def sim_time(self) -> float:

@@ -72,8 +72,6 @@ class World:
         timekeeper: The simulated time.
         physics: The physics world: ray casts, and all that is not part of models and layers.
         collision_filter: Layer names and their bits.
-        velocity_iterations: Velocity iterations of the Box2D solver.
-        position_iterations: Position iterations of the Box2D solver.
         seed: Seed of all random numbers.
         source: The file of the world, and how this file and all other files are read.
         plugin_host: Starts plugins and calls their hooks.
@@ -114,15 +112,15 @@ class World:
             raise ValueError(f"plugin_timeout must be positive [s] or None, got {plugin_timeout}")
         self.source = WorldSource() if source is None else source
         self.seed = checked_seed(seed)
-        self.velocity_iterations = velocity_iterations
-        self.position_iterations = position_iterations
+        self._velocity_iterations = velocity_iterations
+        self._position_iterations = position_iterations
         self.plugin_errors, self.on_invalid_body = plugin_errors, on_invalid_body
         self._paused = False
         self._closed = False
         self._view: OpenView | None = None
 
-        self.timekeeper = Timekeeper(step_size)
         self.physics = PhysicsWorld()
+        self.timekeeper = Timekeeper(step_size, self.physics)
         self.collision_filter = collision_filter or CollisionFilter()
         self.requests = Requests(self.physics.jobs.interrupt)
         self._changes = Changes(self.requests, self.check_open)
@@ -302,6 +300,26 @@ class World:
     def time(self) -> float:
         """Simulated time [s]."""
         return self.timekeeper.sim_time
+
+    @property
+    def velocity_iterations(self) -> int:
+        """Velocity iterations of the Box2D solver; settable."""
+        return self._velocity_iterations
+
+    @velocity_iterations.setter
+    def velocity_iterations(self, count: int) -> None:
+        self._velocity_iterations = count
+        self.physics.jobs.interrupt()
+
+    @property
+    def position_iterations(self) -> int:
+        """Position iterations of the Box2D solver; settable."""
+        return self._position_iterations
+
+    @position_iterations.setter
+    def position_iterations(self, count: int) -> None:
+        self._position_iterations = count
+        self.physics.jobs.interrupt()
 
     def step(self, n: int = 1, *, while_paused: bool = False) -> None:
         """Steps `n` times; has no effect on a paused world unless `while_paused` is true.
@@ -752,6 +770,7 @@ class World:
         """Notifies an observer of all events from now on."""
         observer.attached(self)
         self._observers.add(observer)
+        self.physics.jobs.interrupt()
 
     def remove_observer(self, observer: WorldObserver) -> None:
         """Stops the notifications of an observer.
@@ -760,6 +779,7 @@ class World:
             ValueError: The observer was not added, or has been removed.
         """
         self._observers.remove(observer)
+        self.physics.jobs.interrupt()
 
     @property
     def change_count(self) -> int:
@@ -773,6 +793,7 @@ class World:
     def log_changes(self, log: ChangeLog | None) -> None:
         """Notifies a log of all further changes and steps, instead of the previous one."""
         self.stepping.change_log = self._changes.log = log
+        self.physics.jobs.interrupt()
 
     # -- state ---------------------------------------------------------------------------------
 

@@ -35,7 +35,8 @@ from flatland.config.node import Source
 from flatland.config.reader import YamlReader
 from flatland.physics import Handle, PhysicsWorld
 
-_MISSING: Final = object()
+MISSING: Final = object()
+"""Value of a slot or a cell that is not set."""
 
 
 class UncopyableError(Exception):
@@ -90,6 +91,10 @@ class Kind:
 
     def put(self, obj: Any, content: Any) -> None:
         """Writes contents back into an object."""
+
+    def compared(self, obj: Any, content: Any) -> tuple[Any, ...] | None:  # noqa: ARG002
+        """Returns what `flatland.physics.changed_contents` compares; None to write in any case."""
+        return None
 
     def new(self, obj: Any) -> Any:
         """Returns an empty object for the copy of an object.
@@ -245,11 +250,11 @@ class _Cell(Kind):
         try:
             content = obj.cell_contents
         except ValueError:  # not assigned yet
-            content = _MISSING
+            content = MISSING
         return content, (content,)
 
     def put(self, obj: Any, content: Any) -> None:
-        if content is not _MISSING:
+        if content is not MISSING:
             obj.cell_contents = content
 
     def new(self, obj: Any) -> Any:  # noqa: ARG002
@@ -277,6 +282,9 @@ class _List(Kind):
         self._base.clear(obj)
         self._base.extend(obj, content)
 
+    def compared(self, obj: Any, content: Any) -> tuple[Any, ...]:
+        return _items_of(obj, content)
+
     def new(self, obj: Any) -> Any:
         made = self._base.__new__(type(obj))
         if self._base is collections.deque:
@@ -297,6 +305,9 @@ class _Set(Kind):
     def put(self, obj: Any, content: Any) -> None:
         set.clear(obj)
         set.update(obj, content)
+
+    def compared(self, obj: Any, content: Any) -> tuple[Any, ...]:
+        return _items_of(obj, content)
 
     def new(self, obj: Any) -> Any:
         return set.__new__(type(obj))
@@ -324,6 +335,11 @@ class _Dict(Kind):
     def put(self, obj: Any, content: Any) -> None:
         self._base.clear(obj)
         self._update(obj, content)
+
+    def compared(self, obj: Any, content: Any) -> tuple[Any, ...] | None:
+        # The order of an OrderedDict is not that of the dict.
+        is_ordered = self._base is collections.OrderedDict
+        return None if is_ordered else _items_of(obj, content)
 
     def new(self, obj: Any) -> Any:
         return self._base.__new__(type(obj))
@@ -408,6 +424,7 @@ class _Object(Kind):
         ]
         self._slots = [member for name, member in members if name not in self._outside]
         self._outside_slots = [name for name, _ in members if name in self._outside]
+        self._ignored, self._compared_slots = tuple(self._outside), tuple(self._slots)
         self._has_dict = bool(cls.__dictoffset__)
         containers = (_BY_CLASS[base] for base in cls.__mro__ if base in _BY_CLASS)
         self._items: Kind | None = next(containers, None)
@@ -432,15 +449,22 @@ class _Object(Kind):
             for name in [n for n in current if n not in attributes and n not in self._outside]:
                 del current[name]
             for name, value in attributes.items():
-                if current.get(name, _MISSING) is not value:
+                if current.get(name, MISSING) is not value:
                     current[name] = value
         for member, value in zip(self._slots, slots, strict=True):
-            if value is not _MISSING:
+            if value is not MISSING:
                 member.__set__(obj, value)
-            elif _slot(member, obj) is not _MISSING:
+            elif _slot(member, obj) is not MISSING:
                 member.__delete__(obj)
         if self._items is not None:
             self._items.put(obj, items)
+
+    def compared(self, obj: Any, content: Any) -> tuple[Any, ...] | None:
+        attributes, slots, items = content
+        if self._items is not None and self._items.compared(obj, items) is None:
+            return None
+        saved = attributes if self._has_dict else None
+        return obj, saved, self._ignored, self._compared_slots, slots, items
 
     def new(self, obj: Any) -> Any:
         return object.__new__(self._cls) if self._items is None else self._items.new(obj)
@@ -453,7 +477,7 @@ class _Object(Kind):
                 attributes[name] = copy(value) if make is None else make()
         for member in self._slots:
             value = _slot(member, obj)
-            if value is not _MISSING:
+            if value is not MISSING:
                 member.__set__(made, copy(value))
         for name in self._outside_slots:
             object.__setattr__(made, name, self._outside[name]())
@@ -503,11 +527,16 @@ class _Stateful(Kind):
         return lambda: self.put(made, state)
 
 
+def _items_of(obj: Any, items: Any) -> tuple[Any, ...]:
+    """Returns what is compared of a container without attributes."""
+    return obj, None, (), (), [], items
+
+
 def _slot(member: types.MemberDescriptorType, obj: object) -> Any:
     try:
         return member.__get__(obj)
     except AttributeError:
-        return _MISSING
+        return MISSING
 
 
 # The kinds of the standard containers, not of classes derived from them.

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from flatland.copying.kinds import Kind, kind_of
+from flatland.copying.kinds import MISSING, Kind, kind_of
+from flatland.physics import changed_contents
 
 
 class SavedObjects:
@@ -61,11 +62,15 @@ class SavedObjects:
                 entries.append((kind, obj, content))
             else:
                 kept.append(obj)  # An id must not be used again while others are saved.
-        self._entries, self._last = entries, last
+        compared = [(entry, entry[0].compared(*entry[1:])) for entry in entries]
+        self._entries = [entry for entry, contents in compared if contents is None]
+        self._compared = [entry for entry, contents in compared if contents is not None]
+        self._contents = [contents for _, contents in compared if contents is not None]
+        self._last = last
 
     def __len__(self) -> int:
         """Returns the number of objects whose contents were saved."""
-        return len(self._entries) + len(self._last)
+        return len(self._entries) + len(self._compared) + len(self._last)
 
     def write_back(self) -> Exception | None:
         """Writes the contents back.
@@ -73,6 +78,9 @@ class SavedObjects:
         Returns:
             The first exception of a `__setstate__`, None if there was none.
         """
+        for index in changed_contents(self._contents, MISSING):
+            kind, obj, content = self._compared[index]
+            kind.put(obj, content)
         for kind, obj, content in self._entries:
             kind.put(obj, content)
         first: Exception | None = None

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from flatland.physics import AgentBatch, Run
 from flatland.plugin_api.drive import MAX_COMMAND
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from flatland.geometry import BoolArray, DoubleArray
     from flatland.gym.agents import Agent
     from flatland.gym.situation import Rows, Situation
-    from flatland.physics import RunResult
+    from flatland.physics import Controller, PhysicsBody, RangeFinder, RunResult, Touches
     from flatland.world import World
 
 
@@ -35,37 +36,38 @@ class Batch:
 
         Args:
             agents: The agents, for which `is_possible` is true. If elements are replaced,
-                `agents_changed` must be called.
+                `agent_changed` must be called.
             situation: Receives what the agents observe.
             num_threads: Number of threads that step and scan, 0 for one per core.
         """
+        n = len(agents)
         self._agents = agents
         self._situation = situation
         self._num_threads = num_threads
-        self._is_current = False
-        self._order: list[int] = []
-        self._noisy: list[int] = []
-        self._noises = np.zeros((len(agents), 2), np.uint64)  # see `Laser.next_computed`
-        self._sensor_poses = np.zeros((len(agents), 3))
-        self._ranges = list(situation.ranges)  # a view of each row
+        self._core = AgentBatch([_core_of(agent) for agent in agents])
+        # One thread at a time uses the worlds, and holds the lock of all of them.
+        self._requests = agents[0].world.requests
+        self._commands = np.zeros((n, 3))
+        self._counts = np.zeros(n, np.int64)  # of commands of each agent
+        self._noises = np.zeros((n, 2), np.uint64)  # see `Laser.next_computed`
+        self._sensor_poses = np.zeros((n, 3))
+        self._noisy: set[int] = set()
+        for row in range(n):
+            self._adopt(row)
 
-    def agents_changed(self) -> None:
-        """Reads the agents again before the next step."""
-        self._is_current = False
+    def agent_changed(self, row: int) -> None:
+        """Uses the present agent with an index, which was replaced."""
+        self._core.replace(row, _core_of(self._agents[row]))
+        self._adopt(row)
 
-    def _read_agents(self) -> None:
-        agents = self._agents
-        self._is_current = True
-        # Threads that step overlapping sets of worlds lock them in the same order.
-        self._order = sorted(range(len(agents)), key=lambda row: id(agents[row].world))
-        self._core = AgentBatch(
-            [
-                (agent.body.physics, agent.controller, agent.touches, agent.laser.finder)
-                for agent in agents
-                if agent.controller is not None
-            ]
-        )
-        self._noisy = [row for row, agent in enumerate(agents) if agent.laser.has_noise]
+    def _adopt(self, row: int) -> None:
+        agent = self._agents[row]
+        agent.world.requests.share_lock(self._requests)
+        (self._noisy.add if agent.laser.has_noise else self._noisy.discard)(row)
+
+    def close(self) -> None:
+        """Ends the threads; a further step starts new ones."""
+        self._core.stop_threads()
 
     @staticmethod
     def is_possible(agents: Sequence[Agent], low: DoubleArray, high: DoubleArray) -> bool:
@@ -83,7 +85,9 @@ class Batch:
             and bool((np.abs([low, high]) <= MAX_COMMAND).all())
         )
 
-    def perform(self, commands: DoubleArray, acting: BoolArray, n: int) -> Rows:
+    def perform(
+        self, commands: DoubleArray, acting: BoolArray, n: int, meanwhile: Callable[[], object]
+    ) -> Rows:
         """Carries out commands for some steps of the worlds, and observes all agents.
 
         Args:
@@ -91,86 +95,154 @@ class Batch:
                 steering angle [m/s, rad/s, rad], shape (n, 3).
             acting: Agents that act, shape (n,); the worlds of others are not stepped.
             n: Number of steps.
+            meanwhile: Called while other threads step; it may change the worlds of agents that do
+                not act, and replace these agents. They are observed afterwards.
 
         Returns:
             The agents that remain to be observed.
 
         Raises:
-            Exception: As `World.step`.
+            Exception: As `World.step`, or raised by `meanwhile`.
         """
-        if not self._is_current:
-            self._read_agents()
-        agents = self._agents
-        timekeeper = agents[0].world.timekeeper
-        first = agents[0].world
-        velocity, position = first.velocity_iterations, first.position_iterations
-        run = Run(
-            0, timekeeper.step_size_ns, n, timekeeper.step_size, velocity, position, False, False
-        )
-        steps, observes = acting.copy(), np.ones(len(agents), np.bool_)
-        begun: list[int] = []
-        others: list[int] = []
-        unfinished: dict[int, RunResult | Exception] = {}
-        made = 0
-        is_acting, values = acting.tolist(), commands.tolist()
-        try:
-            for row in self._order:
-                if not is_acting[row]:
-                    continue
-                agent = agents[row]
-                world = agent.world
-                if (
-                    agent.command.on_set is None
-                    and world.velocity_iterations == velocity
-                    and world.position_iterations == position
-                    and not world.physics.has_materials
-                    and world.stepping.begin_unattended()
-                ):
-                    begun.append(row)
-                    agent.command.assign(Twist(*values[row]))
-                else:
-                    others.append(row)
-            if others:
-                steps[others] = observes[others] = False
-            unfinished = self._call_core(run, commands, steps, observes)
-            made = n
-        finally:
-            results = [unfinished.get(row) for row in begun]
-            _end([agents[row].world for row in begun], made, results)
-        if not others and not unfinished:
-            return _NO_ROWS
-        step_agents([agents[row] for row in others], commands[others], n, self._num_threads)
-        rest = sorted([*others, *unfinished])
-        self._situation.collided[rest] = [agents[row].touches.touched for row in rest]
-        return np.array(rest, np.intp)
+        # Code of a plugin that calls this holds the lock already.
+        is_free = not self._requests.lock.is_owned
+        with self._requests.lock:
+            others = [
+                row
+                for row in self._core.not_permitted(acting)
+                if not (is_free and self._permit(row))
+            ]
+            alone = acting.copy()
+            alone[others] = False
+            self._start(commands, alone, alone, n)
+            try:
+                meanwhile()
+            finally:
+                unfinished = self._finish(alone)
+                np.copyto(self._commands, commands, where=alone[:, np.newaxis])
+                self._counts += alone
+                self._complete(unfinished, n)
+        if others:
+            agents = [self._agents[row] for row in others]
+            step_agents(agents, commands[others], n, self._num_threads)
+        for row in (*others, *unfinished):
+            self._situation.collided[row] = self._agents[row].touches.touched
+        idle = [] if acting.all() else np.flatnonzero(~acting).tolist()
+        return self._observe([*unfinished, *idle], others)
 
-    def _call_core(
-        self, run: Run, commands: DoubleArray, steps: BoolArray, observes: BoolArray
-    ) -> dict[int, RunResult | Exception]:
+    def _observe(self, rows: Sequence[int], others: Sequence[int]) -> Rows:
+        """Observes agents; returns those for which the core cannot do this, and others."""
+        if not rows and not others:
+            return _NO_ROWS
+        agents = self._agents
+        chosen = [row for row in rows if not agents[row].world.physics.has_materials]
+        if chosen:
+            steps, observes = np.zeros((2, len(agents)), np.bool_)
+            observes[chosen] = True
+            self._start(self._commands, steps, observes, 0)
+            for error in self._finish(observes).values():
+                if isinstance(error, Exception):
+                    raise error
+        return np.array(sorted({*rows, *others} - set(chosen)), np.intp)
+
+    def _permit(self, row: int) -> bool:
+        """Permits the core to step the world of an agent alone, if this is possible."""
+        agent, first = self._agents[row], self._agents[0].world
+        world = agent.world
+        agent.command.settle()
+        self._core.permit(row)
+        if (
+            agent.command.on_set is None
+            and world.velocity_iterations == first.velocity_iterations
+            and world.position_iterations == first.position_iterations
+            and not world.physics.has_materials
+            and world.stepping.prepare_unattended()
+        ):
+            agent.command.follow(_Commands(self._commands, self._counts, row, world))
+            agent.laser.last_scan = None
+            return True
+        self._core.withdraw(row)
+        return False
+
+    def _start(self, commands: DoubleArray, steps: BoolArray, observes: BoolArray, n: int) -> None:
+        """Begins to carry out commands by n steps, and to observe agents."""
         agents, s = self._agents, self._situation
+        world, timekeeper = agents[0].world, agents[0].world.timekeeper
         for row in self._noisy:
             self._noises[row] = agents[row].laser.next_computed
-        unfinished = dict(
-            self._core.perform(
-                run,
-                steps,
-                observes,
-                np.ascontiguousarray(commands),
-                np.array([agent.world.timekeeper.sim_time_ns for agent in agents], np.int64),
-                self._noises,
-                s.poses,
-                s.velocities,
-                self._sensor_poses,
-                s.ranges,
-                s.collided,
-                self._num_threads,
-            )
+        self._core.start(
+            Run(
+                0,
+                timekeeper.step_size_ns,
+                n,
+                timekeeper.step_size,
+                world.velocity_iterations,
+                world.position_iterations,
+                False,
+                False,
+            ),
+            steps,
+            observes,
+            np.ascontiguousarray(commands),
+            self._noises,
+            s.poses,
+            s.velocities,
+            self._sensor_poses,
+            s.ranges,
+            s.collided,
+            self._num_threads,
         )
-        observed = observes.tolist()
-        for row, (x, y, theta) in enumerate(self._sensor_poses.tolist()):
-            if observed[row] and row not in unfinished:
-                agents[row].laser.count_computed((x, y, theta), self._ranges[row])
+
+    def _finish(self, observes: BoolArray) -> dict[int, RunResult | Exception]:
+        """Completes what was begun; returns the rows with steps that remain."""
+        unfinished = dict(self._core.finish())
+        for row in self._noisy:
+            if observes[row] and row not in unfinished:
+                self._agents[row].laser.count_computed()
         return unfinished
+
+    def _complete(self, unfinished: dict[int, RunResult | Exception], n: int) -> None:
+        """Completes n steps of worlds; raises the exception of the first one that fails."""
+        error: BaseException | None = None
+        for row, result in unfinished.items():
+            self._core.withdraw(row)
+            try:
+                self._agents[row].world.stepping.continue_unattended(n, result)
+            except BaseException as raised:
+                error = error or raised
+        if error is not None:
+            raise error
+
+
+class _Commands:
+    """The commands that the core passes to the drive of an agent."""
+
+    __slots__ = ("_commands", "_counts", "_first", "_row", "_world")
+
+    def __init__(
+        self, commands: DoubleArray, counts: npt.NDArray[np.int64], row: int, world: World
+    ) -> None:
+        self._commands, self._counts, self._row = commands, counts, row
+        self._first = int(counts[row])
+        self._world = world
+
+    @property
+    def value(self) -> Twist:
+        return Twist(*self._commands[self._row].tolist())
+
+    @property
+    def received(self) -> int:
+        return int(self._counts[self._row]) - self._first
+
+    def settled(self) -> None:
+        self._world.physics.jobs.interrupt()
+
+
+def _core_of(agent: Agent) -> tuple[PhysicsBody, Controller, Touches, RangeFinder]:
+    controller = agent.controller
+    if controller is None:
+        raise ValueError(f'the core cannot command model "{agent.model.name}"')
+    return agent.body.physics, controller, agent.touches, agent.laser.finder
 
 
 def step_agents(agents: Sequence[Agent], commands: DoubleArray, n: int, num_threads: int) -> None:
@@ -190,15 +262,3 @@ def step_agents(agents: Sequence[Agent], commands: DoubleArray, n: int, num_thre
         agent.touches.clear()
     worlds = list({id(agent.world): agent.world for agent in agents}.values())
     step_worlds(worlds, n, num_threads)
-
-
-def _end(worlds: list[World], n: int, results: list[RunResult | Exception | None]) -> None:
-    """Completes n steps of worlds; raises the exception of the first one that fails."""
-    error: BaseException | None = None
-    for world, result in zip(worlds, results, strict=True):
-        try:
-            world.stepping.end_unattended(n, result)
-        except BaseException as raised:
-            error = error or raised
-    if error is not None:
-        raise error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -94,6 +94,11 @@ class Episodes:
         self._all = np.arange(n)
         self._columns = list(settings.action.columns)
 
+    def close(self) -> None:
+        """Ends the threads that step and scan."""
+        if self._batch is not None:
+            self._batch.close()
+
     @property
     def goal_radius(self) -> float:
         """Distance to the goal at which an agent has arrived [m]."""
@@ -126,7 +131,7 @@ class Episodes:
         self._lasers[row] = agent.laser
         self._buildings[row] = building
         if self._batch is not None:
-            self._batch.agents_changed()
+            self._batch.agent_changed(row)
 
     def begin(
         self, row: int, rng: np.random.Generator, occupied: Occupied, options: Mapping[str, Any]
@@ -181,7 +186,11 @@ class Episodes:
         return numbers
 
     def step(
-        self, actions: DoubleArray, rows: Rows | None = None, observed: Rows | None = None
+        self,
+        actions: DoubleArray,
+        rows: Rows | None = None,
+        observed: Rows | None = None,
+        meanwhile: Callable[[], object] = lambda: None,
     ) -> None:
         """Carries out actions for one step of the environment, and observes agents.
 
@@ -189,6 +198,8 @@ class Episodes:
             actions: Numbers in [-1, 1] of all agents, as `read_actions` returns them.
             rows: Agents that act; None for all. The others stand still.
             observed: Agents that must be observed; None for all.
+            meanwhile: Called before the observation of the agents that do not act; may begin their
+                next episodes.
         """
         s = self.situation
         commands = np.zeros((len(s), 3))
@@ -202,6 +213,7 @@ class Episodes:
         self.randomization.change_commands(commands, s, acting_rows)
         n = self.settings.physics_steps
         if self._batch is None:
+            meanwhile()
             agents = [self.agents[row] for row in acting_rows.tolist()]
             step_agents(agents, commands[chosen], n, self._num_threads)
             s.collided[chosen] = [agent.touches.touched for agent in agents]
@@ -209,7 +221,7 @@ class Episodes:
             return
         acting = np.zeros(len(s), np.bool_)
         acting[chosen] = True
-        self._measure(self._batch.perform(commands, acting, n))
+        self._measure(self._batch.perform(commands, acting, n, meanwhile))
         self._observe()
 
     def look(self, rows: Rows | None = None) -> None:

@@ -222,6 +222,7 @@ class Stage:
             for world in reversed(self.worlds):
                 closing.callback(world.close)
             self._view.close()
+            self.episodes.close()
 
 
 def _check_memory(count: int, buildings: int, size: int) -> None:

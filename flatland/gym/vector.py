@@ -181,8 +181,10 @@ class FlatlandVectorEnv(StagedVector):
         # Only in the mode NEXT_STEP has any episode ended here.
         fresh = self._has_ended.copy()
         if fresh.any():
-            self._begin(np.flatnonzero(fresh))
-            self._episodes.step(numbers, np.flatnonzero(~fresh))
+            begun = np.flatnonzero(fresh)
+            self._episodes.step(
+                numbers, np.flatnonzero(~fresh), meanwhile=lambda: self._begin(begun)
+            )
         else:
             self._episodes.step(numbers)
         rewards, terminated, truncated = self._episodes.judge()

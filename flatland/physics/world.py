@@ -16,24 +16,36 @@ class PhysicsWorld(_core.World):
     Worlds are independent: different threads may step different worlds at the same time.
 
     Attributes:
-        pre_solve: Function called as `pre_solve(contact, old_manifold)` within `step`, before the
-            solver processes a contact of one of `pre_solve_bodies`; None for no function. The
-            function may set `enabled`, `friction`, `restitution` and `tangent_speed` of the
-            contact and read the world, but not change the world. In a step that reports invalid
-            bodies, numbers of contacts may be NaN. `take_pre_solve_errors` returns the exceptions
-            that it raises.
         pre_solve_bodies: Ids of the bodies whose contacts are passed to `pre_solve`. Contacts of
             other bodies cause no overhead.
     """
 
-    __slots__ = ("_pre_solve_errors", "pre_solve", "pre_solve_bodies")
+    __slots__ = ("_pre_solve", "_pre_solve_errors", "pre_solve_bodies")
 
     def __init__(self) -> None:
         """Creates an empty world."""
         super().__init__()
-        self.pre_solve: PreSolveHook | None = None
+        self._pre_solve: PreSolveHook | None = None
         self.pre_solve_bodies: set[int] = set()
         self._pre_solve_errors: list[BaseException] = []
+
+    @property
+    def pre_solve(self) -> PreSolveHook | None:
+        """Function called before the solver processes a contact of one of `pre_solve_bodies`.
+
+        It is called as `pre_solve(contact, old_manifold)` within `step`; None for no function;
+        settable. The function may set `enabled`, `friction`, `restitution` and `tangent_speed` of
+        the contact and read the world, but not change the world. In a step that reports invalid
+        bodies, numbers of contacts may be NaN. `take_pre_solve_errors` returns the exceptions that
+        it raises.
+        """
+        return self._pre_solve
+
+    @pre_solve.setter
+    def pre_solve(self, function: PreSolveHook | None) -> None:
+        if function is not self._pre_solve:
+            self._pre_solve = function
+            self.jobs.interrupt()
 
     def close(self) -> None:
         """Destroys the world and all objects in it; idempotent.

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Hashable
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from flatland.errors import PLUGIN_FAULTS, WorldError
 from flatland.graph_names import global_name
 
 T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
 SubscriberFault = Callable[["Output[Any]", Callable[[Any], None], BaseException], None]
 
 
@@ -150,6 +151,21 @@ class Output(Generic[T]):
         return unsubscribe
 
 
+class CommandSource(Protocol[T_co]):
+    """Passes valid values to the plugin of a command without a call of `Command.set`."""
+
+    @property
+    def value(self) -> T_co:
+        """The last value."""
+
+    @property
+    def received(self) -> int:
+        """Number of values."""
+
+    def settled(self) -> None:
+        """Called when the command has other values from now on."""
+
+
 class Command(Generic[T]):
     """A value that is set from outside and read by a plugin.
 
@@ -157,25 +173,26 @@ class Command(Generic[T]):
         name: Topic under the namespace of the model, with a leading `/` only if it is global.
         topic: The topic with a leading `/`.
         value_type: Type of the values.
-        received: Number of values accepted.
         owner: Name of the plugin that opened it, for messages.
         closed: Whether the plugin has ended.
-        on_set: Called as `on_set(command, value)` before each `set`, also for values that are not
-            accepted; None for no function.
         on_change: Called after `value` was set, in any thread; None for no function.
     """
 
-    outside_state: ClassVar[dict[str, Callable[[], object]]] = {"on_set": lambda: None}
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {
+        "_on_set": lambda: None,
+        "_source": lambda: None,
+    }
 
     __slots__ = (
+        "_on_set",
+        "_received",
+        "_source",
         "_value",
         "accept",
         "closed",
         "name",
         "on_change",
-        "on_set",
         "owner",
-        "received",
         "topic",
         "value_type",
     )
@@ -202,32 +219,61 @@ class Command(Generic[T]):
         self.topic = global_name(name)
         self.value_type = value_type
         self._value = default
-        self.received = 0
+        self._received = 0
         self.closed = False
         self.accept = accept
-        self.on_set: Callable[[Command[T], T], None] | None = None
+        self._source: CommandSource[T] | None = None
+        self._on_set: Callable[[Command[T], T], None] | None = None
         self.on_change: Callable[[], None] | None = None
 
     @property
     def value(self) -> T:
         """The last value accepted, or the default."""
-        return self._value
+        return self._value if self._source is None else self._source.value
 
     @value.setter
     def value(self, value: T) -> None:
+        self.settle()
         self._value = value
         if self.on_change is not None:
             self.on_change()
 
-    def assign(self, value: T) -> None:
-        """Sets a valid value that was passed to the plugin already."""
-        self._value = value
-        self.received += 1
+    @property
+    def received(self) -> int:
+        """Number of values accepted."""
+        return self._received + (0 if self._source is None else self._source.received)
+
+    @property
+    def on_set(self) -> Callable[[Command[T], T], None] | None:
+        """Called as `on_set(command, value)` before each `set`, also for values not accepted.
+
+        None for no function; settable.
+        """
+        return self._on_set
+
+    @on_set.setter
+    def on_set(self, function: Callable[[Command[T], T], None] | None) -> None:
+        self.settle()
+        self._on_set = function
+
+    def follow(self, source: CommandSource[T]) -> None:
+        """Takes its values from a source that passes them to the plugin itself, until `settle`."""
+        self.settle()
+        self._source = source
+
+    def settle(self) -> None:
+        """Keeps the last value of a source, which must not pass further values to the plugin."""
+        if self._source is not None:
+            source = self._source
+            self._value, self._received = source.value, self.received
+            self._source = None
+            source.settled()
 
     def renew(self, new: Command[T]) -> None:
         """Becomes equal to a new command of the same topic; `on_set` remains."""
         self.name, self.owner, self.accept = new.name, new.owner, new.accept
-        self._value, self.received, self.closed = new.value, 0, False
+        self.settle()
+        self._value, self._received, self.closed = new.value, 0, False
         self.on_change = None
 
     def set(self, value: T) -> None:
@@ -241,8 +287,8 @@ class Command(Generic[T]):
         if self.on_set is not None:
             self.on_set(self, value)
         if self.accept is None or self.accept(value):
-            self.received += 1
             self.value = value
+            self._received += 1
 
 
 class CommandTopic(Generic[T]):

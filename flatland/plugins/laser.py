@@ -45,7 +45,8 @@ class Laser(RangeSensor):
             without the layer and without materials.
         beam_ends: End point of each beam in the sensor frame [m], shape (n, 2), read-only.
         last_scan: Pose of the sensor in the world frame and ranges [m], shape (n,), of the last
-            scan computed; None before the first one. The ranges are equal to the emitted ones.
+            scan computed; None before the first one, and after a scan of the core for
+            `flatland.gym`. The ranges are equal to the emitted ones.
     """
 
     # The ranges may be in an array of the caller of `compute_scans`, which belongs to no state.
@@ -190,16 +191,9 @@ class Laser(RangeSensor):
         """Key of the random numbers of the next scan on request, and its number in the stream."""
         return self._computed.key, self._computed.updates + self._has_noise
 
-    def count_computed(self, pose: Pose, ranges: FloatArray) -> None:
-        """Counts a scan on request that the core has computed with the numbers `next_computed`.
-
-        Args:
-            pose: Pose of the sensor in the world frame.
-            ranges: Range of each beam [m], shape (n,), float32.
-        """
-        if self._has_noise:
-            self._computed.begin_update()
-        self.last_scan = (pose, ranges)
+    def count_computed(self) -> None:
+        """Counts a scan on request that the core has computed with the numbers `next_computed`."""
+        self._computed.begin_update()
 
     def cast_without_noise(self) -> tuple[Pose, FloatArray]:
         """Casts the beams from the current pose without changing the state of the laser.

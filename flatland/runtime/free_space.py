@@ -57,6 +57,7 @@ class FreeSpace:
             math.sqrt(width * height / _MAX_CELLS),
             max(width, height) / _MAX_CELLS,
         )
+        self._x, self._y = float(x_min), float(y_min)
         self._origin = np.array([x_min, y_min])
         self._extent = np.array([width, height])
         self._columns = max(1, math.ceil(width / self._cell))
@@ -138,8 +139,8 @@ class FreeSpace:
 
     def cell_at(self, x: float, y: float) -> int | None:
         """Returns the cell of a point in the world frame [m], None out of bounds."""
-        column = math.floor((x - float(self._origin[0])) / self._cell)
-        row = math.floor((y - float(self._origin[1])) / self._cell)
+        column = math.floor((x - self._x) / self._cell)
+        row = math.floor((y - self._y) / self._cell)
         if not (0 <= column < self._columns and 0 <= row < self._rows):
             return None
         return row * self._columns + column
@@ -155,12 +156,14 @@ class FreeSpace:
             margin: Distance by which the path may leave the rectangle whose opposite corners are
                 the points [m].
         """
-        corners = np.array((start, goal))
-        low = np.floor((corners.min(axis=0) - margin - self._origin) / self._cell).astype(int)
-        high = np.floor((corners.max(axis=0) + margin - self._origin) / self._cell).astype(int) + 1
-        first_column, first_row = np.maximum(low, 0).tolist()
+        # Without arrays, which take longer for two points.
+        (x_min, x_max), (y_min, y_max) = sorted((start[0], goal[0])), sorted((start[1], goal[1]))
+        first_column = max(math.floor((x_min - margin - self._x) / self._cell), 0)
+        first_row = max(math.floor((y_min - margin - self._y) / self._cell), 0)
+        end_column = math.floor((x_max + margin - self._x) / self._cell) + 1
+        end_row = math.floor((y_max + margin - self._y) / self._cell) + 1
         grid = self._regions.reshape(self._rows, self._columns)
-        window = grid[first_row : int(high[1]), first_column : int(high[0])] > 0
+        window = grid[first_row:end_row, first_column:end_column] > 0
         regions = connected_regions(window, diagonally=True)
         ends = []
         for x, y in (start, goal):
@@ -180,9 +183,10 @@ class FreeSpace:
             v: Position along y within the cell, from 0 to 1.
         """
         row, column = divmod(cell, self._columns)
-        x = min((column + u) * self._cell, float(self._extent[0]))
-        y = min((row + v) * self._cell, float(self._extent[1]))
-        return (float(self._origin[0]) + x, float(self._origin[1]) + y)
+        width, height = self._extent.tolist()
+        x = min((column + u) * self._cell, width)
+        y = min((row + v) * self._cell, height)
+        return (self._x + x, self._y + y)
 
     def places_in(self, cells: IntArray, rng: np.random.Generator) -> DoubleArray:
         """Returns a random point of each cell in the world frame [m], shape (n, 2)."""

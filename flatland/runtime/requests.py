@@ -73,6 +73,13 @@ class Requests:
 
     # -- threads ---------------------------------------------------------------------------
 
+    def share_lock(self, other: Requests) -> None:
+        """Uses the lock of another world, so that one thread at a time uses both worlds.
+
+        To be called while no thread uses this world.
+        """
+        self._waiting, self.lock = other._waiting, other.lock
+
     @contextmanager
     def serving(self, wake: Callable[[], None]) -> Iterator[None]:
         """Makes the current thread the only one that runs actions, for the duration of the block.
@@ -272,6 +279,11 @@ class StepLock(_RLock):  # type: ignore[misc]
     def __init__(self, waiting: _Waiting) -> None:
         """Creates a free lock."""
         self._waiting = waiting
+
+    @property
+    def is_owned(self) -> bool:
+        """Whether the current thread holds the lock."""
+        return bool(_RLock._is_owned(self))
 
     def release(self) -> None:
         """Releases the lock once."""

@@ -165,6 +165,7 @@ class Snapshots:
 
     def take(self, original: WorldSnapshot | None = None) -> WorldSnapshot:
         """Takes a snapshot; see `World.snapshot`."""
+        self._settle()
         if original is None:
             physics = self._physics.copy()
         else:
@@ -210,7 +211,14 @@ class Snapshots:
         before = [plugin for model in snapshot._models for plugin in model.plugins]
         return [each for each in (*before, *snapshot._world_plugins) if each not in present]
 
+    def _settle(self) -> None:
+        """Ends the values that a source passes to commands, which are no part of a snapshot."""
+        for commands in self._ports.commands.values():
+            for command in commands:
+                command.settle()
+
     def _restore(self, snapshot: WorldSnapshot) -> None:
+        self._settle()
         models, observers = list(self._models.by_name.values()), self._observers
         kept = set(models) & set(snapshot._models)
         revived = [model for model in snapshot._models if model not in kept]
@@ -294,6 +302,7 @@ class Snapshots:
         Raises:
             WorldError: A plugin has an attribute that cannot be copied.
         """
+        self._settle()
         copier = Copier(self._kinds)
         physics, copy = self._physics, clone._physics
         copy.become_copy_of(physics)

@@ -146,46 +146,41 @@ class Stepping:
 
         return perform(self.run(n), run_paced)
 
-    def begin_unattended(self) -> bool:
-        """Prepares steps that the core performs without any code in between.
+    def prepare_unattended(self) -> bool:
+        """Prepares runs that the core begins without any code before.
+
+        To be called by a thread that holds the lock of the requests.
 
         Returns:
-            Whether this is possible: nothing observes the world, no request waits, and no plugin
-            has to be called first. Then the world is locked, and `end_unattended` must follow.
+            Whether this is possible, as long as nothing interrupts the jobs of the world: nothing
+            observes the world, and no request waits.
         """
         requests, host = self._requests, self._host
         if (
             requests.actions
             or requests.in_use
-            or host.jobs.is_pending
-            or host.contacts.is_stale
             or self._observers.watch_any
             or self.change_log is not None
             or self._faults.first is not None
             or self._world.paused
             or self._world.closed
-            or self._physics.pre_solve is not None
         ):
             return False
-        return bool(requests.lock.acquire(blocking=False))
+        host.contacts.update()
+        host.jobs.refresh(transforms_wanted=False)
+        return self._physics.pre_solve is None
 
-    def end_unattended(self, n: int, result: RunResult | Exception | None) -> None:
-        """Ends what `begin_unattended` has begun, and performs the steps that remain.
+    def continue_unattended(self, n: int, result: RunResult | Exception) -> None:
+        """Completes steps that the core has begun.
 
         Args:
             n: Number of steps.
-            result: What the core returned or raised if it did not complete the steps; else None.
+            result: What the core returned or raised.
 
         Raises:
             Exception: As `World.step`.
         """
-        try:
-            if result is None:
-                self._timekeeper.sim_time_ns += n * self._timekeeper.step_size_ns
-                return
-            made = perform(self.run(n, begun=result), self._queue.run)
-        finally:
-            self._requests.lock.release()
+        made = perform(self.run(n, begun=result), self._queue.run)
         if made < n:
             self.step(n - made)
 

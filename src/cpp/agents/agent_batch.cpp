@@ -1,7 +1,6 @@
 #include "agents/agent_batch.h"
 
 #include <algorithm>
-#include <iterator>
 #include <optional>
 #include <type_traits>
 #include <variant>
@@ -31,47 +30,80 @@ void set_target(Motion& motion, const double* velocity) {
 
 }  // namespace
 
-double AgentBatch::expected_time(const AgentCommands& commands, const Run& run) {
-  double seconds = 0.0;
-  for (std::size_t i = 0; i < agents_.size(); ++i) {
-    Run own = run;
-    own.time = commands.times[i];
-    if (commands.steps[i]) seconds += agents_[i].world->expected_time(own);
-  }
-  return seconds;
+AgentBatch::AgentBatch(std::vector<Agent> agents)
+    : agents_(std::move(agents)), permitted_(agents_.size(), kNever) {}
+
+void AgentBatch::replace(std::size_t i, Agent agent) {
+  agents_[i] = std::move(agent);
+  withdraw(i);
 }
 
-std::vector<UnfinishedRun> AgentBatch::perform(const AgentCommands& commands, const Run& run,
-                                               const AgentObservations& rows,
-                                               std::size_t num_threads) {
-  std::vector<std::optional<UnfinishedRun>> unfinished(agents_.size());
-  const auto perform_one = [&](std::size_t i) {
-    RunResult result;
-    try {
-      if (commands.steps[i]) {
-        Run own = run;
-        own.time = commands.times[i];
-        result = step(agents_[i], commands.velocities + 3 * i, own);
-        if (result.steps < run.n) {
-          unfinished[i] = UnfinishedRun{i, std::move(result), nullptr};
-          return;
-        }
-      }
-      if (commands.observes[i]) observe(i, commands, rows);
-    } catch (const std::exception&) {
-      unfinished[i] = UnfinishedRun{i, {}, std::current_exception()};
-    }
-  };
-  const std::size_t parts = (agents_.size() + kAgentsPerJob - 1) / kAgentsPerJob;
-  agents_.front().world->threads().parallel_for(parts, num_threads, [&](std::size_t part) {
-    const std::size_t end = std::min(agents_.size(), (part + 1) * kAgentsPerJob);
-    for (std::size_t i = part * kAgentsPerJob; i < end; ++i) perform_one(i);
+void AgentBatch::permit(std::size_t i) { permitted_[i] = agents_[i].world->clear_interrupt(); }
+
+std::vector<std::size_t> AgentBatch::not_permitted(const bool* steps) const {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < agents_.size(); ++i) {
+    if (steps[i] && permitted_[i] != agents_[i].world->interrupts()) found.push_back(i);
+  }
+  return found;
+}
+
+bool AgentBatch::takes_longer(double seconds, const AgentCommands& commands, const Run& run) {
+  double expected = 0.0;
+  for (std::size_t i = 0; i < agents_.size() && expected <= seconds; ++i) {
+    Run own = run;
+    own.time = agents_[i].world->time();
+    if (commands.steps[i]) expected += agents_[i].world->expected_time(own);
+  }
+  return expected > seconds;
+}
+
+void AgentBatch::start(const AgentCommands& commands, const Run& run, const AgentObservations& rows,
+                       std::size_t num_threads) {
+  commands_ = commands;
+  run_ = run;
+  rows_ = rows;
+  chosen_.clear();
+  for (std::size_t i = 0; i < agents_.size(); ++i) {
+    if (commands.steps[i] || commands.observes[i]) chosen_.push_back(i);
+  }
+  unfinished_.assign(chosen_.size(), std::nullopt);
+  const std::size_t parts = (chosen_.size() + kAgentsPerJob - 1) / kAgentsPerJob;
+  work_ = threads_.start(parts, num_threads, [this](std::size_t part) {
+    const std::size_t end = std::min(chosen_.size(), (part + 1) * kAgentsPerJob);
+    for (std::size_t k = part * kAgentsPerJob; k < end; ++k) perform(k);
   });
+}
+
+std::vector<UnfinishedRun> AgentBatch::finish() {
+  const std::unique_ptr<ThreadPool::Work> work = std::move(work_);
+  work->finish();
   std::vector<UnfinishedRun> found;
-  for (auto& each : unfinished) {
+  for (auto& each : unfinished_) {
     if (each) found.push_back(std::move(*each));
   }
   return found;
+}
+
+void AgentBatch::perform(std::size_t k) {
+  const std::size_t i = chosen_[k];
+  RunResult result;
+  try {
+    if (commands_.steps[i]) {
+      World& world = *agents_[i].world;
+      Run own = run_;
+      own.time = world.time();
+      result = step(agents_[i], commands_.velocities + 3 * i, own);
+      if (result.steps < own.n) {
+        unfinished_[k] = UnfinishedRun{i, std::move(result), nullptr};
+        return;
+      }
+      world.set_time(own.time + own.n * own.step);
+    }
+    if (commands_.observes[i]) observe(i);
+  } catch (const std::exception&) {
+    unfinished_[k] = UnfinishedRun{i, {}, std::current_exception()};
+  }
 }
 
 RunResult AgentBatch::step(const Agent& agent, const double* velocity, const Run& run) {
@@ -85,8 +117,7 @@ RunResult AgentBatch::step(const Agent& agent, const double* velocity, const Run
   return world.run(run);
 }
 
-void AgentBatch::observe(std::size_t i, const AgentCommands& commands,
-                         const AgentObservations& rows) {
+void AgentBatch::observe(std::size_t i) {
   const Agent& agent = agents_[i];
   World& world = *agent.world;
   const b2Body* body = world.find_body(agent.body);
@@ -95,15 +126,15 @@ void AgentBatch::observe(std::size_t i, const AgentCommands& commands,
   const Triple velocity = velocity_of(*body);
   const Triple sensor_pose = agent.finder->pose_of(pose);
   const b2Transform origin = checked_pose(sensor_pose);
-  std::copy(pose.begin(), pose.end(), rows.poses + 3 * i);
-  std::copy(velocity.begin(), velocity.end(), rows.velocities + 3 * i);
-  std::copy(sensor_pose.begin(), sensor_pose.end(), rows.sensor_poses + 3 * i);
-  if (commands.steps[i]) {
+  std::copy(pose.begin(), pose.end(), rows_.poses + 3 * i);
+  std::copy(velocity.begin(), velocity.end(), rows_.velocities + 3 * i);
+  std::copy(sensor_pose.begin(), sensor_pose.end(), rows_.sensor_poses + 3 * i);
+  if (commands_.steps[i]) {
     const TouchCollector* touches = world.contacts().touches.find(agent.touches);
-    rows.touched[i] = touches->was_touched || !touches->touches.empty();
+    rows_.touched[i] = touches->was_touched || !touches->touches.empty();
   }
-  const Readings readings{rows.ranges + i * agent.finder->readings(), nullptr};
-  const NoiseKey key{commands.noises[2 * i], commands.noises[2 * i + 1]};
+  const Readings readings{rows_.ranges + i * agent.finder->readings(), nullptr};
+  const NoiseKey key{commands_.noises[2 * i], commands_.noises[2 * i + 1]};
   ScanMemoryPool& memories = world.rays().memories();
   std::unique_ptr<ScanMemory> memory = memories.take();
   agent.finder->scan(SceneView(world.rays()), origin, key, readings, *memory);

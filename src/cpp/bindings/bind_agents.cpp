@@ -5,7 +5,6 @@
 #include <memory>
 #include <string>
 #include <tuple>
-#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -54,36 +53,70 @@ class PyAgentBatch {
     for (const PyAgent& agent : given) worlds_.push_back(std::get<0>(agent).world);
   }
 
-  py::list perform(const PyRun& given_run, const Rows<bool>& steps, const Rows<bool>& observes,
-                   const Rows<double>& velocities, const Rows<std::int64_t>& times,
-                   const Rows<std::uint64_t>& noises, Rows<double>& poses, Rows<double>& pose_rates,
-                   Rows<double>& sensor_poses, Rows<float>& ranges, Rows<bool>& touched,
-                   std::size_t num_threads) {
+  void replace(std::size_t row, const PyAgent& given) {
+    check_row(row);
+    Agent agent = to_agent(given);
+    std::vector<Agent> others = batch_.agents();
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(row));
+    check_beside(agent, others);
+    batch_.replace(row, std::move(agent));
+    worlds_[row] = std::get<0>(given).world;
+  }
+  void permit(std::size_t row) {
+    check_row(row);
+    batch_.permit(row);
+  }
+  void withdraw(std::size_t row) {
+    check_row(row);
+    batch_.withdraw(row);
+  }
+  std::vector<std::size_t> not_permitted(const Rows<bool>& steps) const {
+    check_rows(steps, batch_.agents().size(), 1, "steps");
+    return batch_.not_permitted(steps.data());
+  }
+
+  void start(const PyRun& given_run, const Rows<bool>& steps, const Rows<bool>& observes,
+             const Rows<double>& velocities, const Rows<std::uint64_t>& noises, Rows<double>& poses,
+             Rows<double>& pose_rates, Rows<double>& sensor_poses, Rows<float>& ranges,
+             Rows<bool>& touched, std::size_t num_threads) {
+    if (uses_) throw py::value_error("the batch has begun already");
     const std::size_t agents = batch_.agents().size();
     const std::size_t readings = batch_.agents().front().finder->readings();
     check_rows(steps, agents, 1, "steps");
     check_rows(observes, agents, 1, "observes");
     check_rows(velocities, agents, 3, "velocities");
-    check_rows(times, agents, 1, "times");
     check_rows(noises, agents, 2, "noises");
     check_rows(poses, agents, 3, "poses");
     check_rows(pose_rates, agents, 3, "pose_rates");
     check_rows(sensor_poses, agents, 3, "sensor_poses");
     check_rows(ranges, agents, readings, "ranges");
     check_rows(touched, agents, 1, "touched");
-    const AgentCommands commands{steps.data(), observes.data(), velocities.data(), times.data(),
-                                 noises.data()};
+    const AgentCommands commands{steps.data(), observes.data(), velocities.data(), noises.data()};
     const AgentObservations rows{poses.mutable_data(), pose_rates.mutable_data(),
                                  sensor_poses.mutable_data(), ranges.mutable_data(),
                                  touched.mutable_data()};
     const Run run = to_run(given_run);
     run.check();
-    // Safe without the GIL: the worlds are in use, and the caller keeps the arrays alive.
-    Uses uses(batch_.agents());
-    const bool is_long = batch_.expected_time(commands, run) > kShortStep;
-    const auto unfinished = without_gil_if(is_long, uses, [&] {
-      return batch_.perform(commands, run, rows, is_long ? num_threads : 1);
-    });
+    auto uses = std::make_unique<Uses>(batch_.agents(), commands);
+    is_long_ = batch_.takes_longer(kShortStep, commands, run);
+    // The arrays must exist until the end.
+    arrays_ = {steps,      observes,     velocities, noises, poses,
+               pose_rates, sensor_poses, ranges,     touched};
+    // Safe without the GIL: the worlds are in use.
+    batch_.start(commands, run, rows, is_long_ ? num_threads : 1);
+    uses_ = std::move(uses);
+  }
+
+  void stop_threads() {
+    if (uses_) throw py::value_error("`finish` was not called");
+    batch_.stop_threads();
+  }
+
+  py::list finish() {
+    if (!uses_) throw py::value_error("the batch has not begun");
+    const std::unique_ptr<Uses> uses = std::move(uses_);
+    const auto unfinished = without_gil_if(is_long_, *uses, [&] { return batch_.finish(); });
+    arrays_.clear();
     py::list list;
     for (const UnfinishedRun& each : unfinished) {
       py::object result = each.error ? error_of(each.error) : py::cast(result_tuple(each.result));
@@ -93,13 +126,14 @@ class PyAgentBatch {
   }
 
  private:
-  // Exclusive uses of all worlds that end together.
+  // Exclusive uses of the worlds of the agents that step or are observed; they end together.
   class Uses {
    public:
-    explicit Uses(const std::vector<Agent>& agents) {
+    Uses(const std::vector<Agent>& agents, const AgentCommands& commands) {
       uses_.reserve(agents.size());
-      for (const Agent& agent : agents) {
-        uses_.push_back(std::make_unique<World::ExclusiveUse>(*agent.world, World::kStepping));
+      for (std::size_t i = 0; i < agents.size(); ++i) {
+        if (!commands.steps[i] && !commands.observes[i]) continue;
+        uses_.push_back(std::make_unique<World::ExclusiveUse>(*agents[i].world, World::kStepping));
       }
     }
     void end() { uses_.clear(); }
@@ -108,24 +142,39 @@ class PyAgentBatch {
     std::vector<std::unique_ptr<World::ExclusiveUse>> uses_;
   };
 
+  // Throws a ValueError unless the batch may contain an agent beside the others.
+  static void check_beside(const Agent& agent, const std::vector<Agent>& others) {
+    for (const Agent& other : others) {
+      if (other.world == agent.world) {
+        throw py::value_error("the agents of a batch must have different worlds");
+      }
+      if (other.finder->readings() != agent.finder->readings()) {
+        throw py::value_error("the agents of a batch must have equal numbers of readings");
+      }
+    }
+  }
+
   static std::vector<Agent> to_agents(const std::vector<PyAgent>& given) {
     if (given.empty()) throw py::value_error("a batch requires an agent");
     std::vector<Agent> agents;
-    std::unordered_set<const World*> worlds;
     for (const PyAgent& each : given) {
-      agents.push_back(to_agent(each));
-      if (!worlds.insert(agents.back().world).second) {
-        throw py::value_error("the agents of a batch must have different worlds");
-      }
-      if (agents.back().finder->readings() != agents.front().finder->readings()) {
-        throw py::value_error("the agents of a batch must have equal numbers of readings");
-      }
+      Agent agent = to_agent(each);
+      check_beside(agent, agents);
+      agents.push_back(std::move(agent));
     }
     return agents;
   }
 
-  AgentBatch batch_;
+  void check_row(std::size_t row) const {
+    if (row >= batch_.agents().size()) throw py::index_error("there is no such agent");
+  }
+
   std::vector<PyWorld> worlds_;
+  // From `start` to `finish`.
+  std::vector<py::object> arrays_;
+  std::unique_ptr<Uses> uses_;
+  bool is_long_ = false;
+  AgentBatch batch_;  // completes what it has begun before the members above end
 };
 
 // Computations on the arrays of a flatland.gym.Situation.
@@ -286,24 +335,66 @@ Raises:
     ValueError: Two agents have the same world, their numbers of readings differ, or a range finder
         measures intensities.
 )")
-      .def("perform", &PyAgentBatch::perform, py::arg("run"), py::arg("steps").noconvert(),
-           py::arg("observes").noconvert(), py::arg("velocities").noconvert(),
-           py::arg("times").noconvert(), py::arg("noises").noconvert(),
-           py::arg("poses").noconvert(), py::arg("pose_rates").noconvert(),
-           py::arg("sensor_poses").noconvert(), py::arg("ranges").noconvert(),
-           py::arg("touched").noconvert(), py::arg("num_threads"), R"(
-Sets the commands of agents, performs steps of their worlds, and observes them.
+      .def("replace", &PyAgentBatch::replace, py::arg("row"), py::arg("agent"), R"(
+Replaces an agent by one of another world, which has no permission.
 
-All arrays are C-contiguous, with a row for each agent. The results do not depend on the number of
+Args:
+    row: Index of the agent.
+    agent: As for the constructor.
+
+Raises:
+    IndexError: There is no such agent.
+    ValueError: As for the constructor.
+)")
+      .def("permit", &PyAgentBatch::permit, py::arg("row"), R"(
+Permits to step the world of an agent without any code in between.
+
+The permission ends with `JobQueue.interrupt` of the world. To be called before the caller examines
+whether there is such code, so that later changes withdraw the permission.
+
+Args:
+    row: Index of the agent.
+
+Raises:
+    IndexError: There is no such agent.
+)")
+      .def("withdraw", &PyAgentBatch::withdraw, py::arg("row"), R"(
+Withdraws the permission of an agent.
+
+Args:
+    row: Index of the agent.
+
+Raises:
+    IndexError: There is no such agent.
+)")
+      .def("not_permitted", &PyAgentBatch::not_permitted, py::arg("steps").noconvert(), R"(
+Returns the agents without a permission.
+
+Args:
+    steps: Agents that are examined, shape (n,).
+
+Raises:
+    ValueError: The array has another shape.
+)")
+      .def("start", &PyAgentBatch::start, py::arg("run"), py::arg("steps").noconvert(),
+           py::arg("observes").noconvert(), py::arg("velocities").noconvert(),
+           py::arg("noises").noconvert(), py::arg("poses").noconvert(),
+           py::arg("pose_rates").noconvert(), py::arg("sensor_poses").noconvert(),
+           py::arg("ranges").noconvert(), py::arg("touched").noconvert(), py::arg("num_threads"),
+           R"(
+Sets the commands of agents, and begins to step their worlds and to observe them.
+
+Other threads do this until `finish`. Meanwhile these worlds and the arrays must not be used, except
+for the rows of agents that neither step nor are observed. All arrays are C-contiguous, with a row for each agent. The results do not depend on the number of
 threads.
 
 Args:
-    run: The steps, as `Run`; each world has a time of its own.
+    run: The steps, as `Run`; each world has a time of its own, which it advances if the steps are
+        complete.
     steps: Whether the world of the agent steps, shape (n,).
     observes: Whether the agent is observed, after its steps, shape (n,).
     velocities: Commands (forward, sideways, omega), or (speed, 0, steering angle) for a drive that is
         steered [m/s, rad/s, rad], shape (n, 3).
-    times: Simulated times of the worlds [ns], shape (n,).
     noises: Stream and number of the update of each scan, shape (n, 2).
     poses: Receives (x, y, theta) of the bodies in the world frame, shape (n, 3).
     pose_rates: Receives the velocities of their origins (vx, vy, omega), shape (n, 3).
@@ -312,14 +403,26 @@ Args:
     touched: Receives whether an agent touched anything in its steps, shape (n,).
     num_threads: Maximum number of threads; 0 for one per core.
 
+Raises:
+    ValueError: An array has another shape, a number is out of range, or `finish` was not called.
+    StaleHandleError: A world is closed.
+    WorldLockedError: A world is in use.
+)")
+      .def("stop_threads", &PyAgentBatch::stop_threads, R"(
+Ends the threads of the batch; `start` creates new ones.
+
+Raises:
+    ValueError: `finish` was not called.
+)")
+      .def("finish", &PyAgentBatch::finish, R"(
+Completes what `start` has begun.
+
 Returns:
     Agents whose steps are not complete, with what `JobQueue.run` returns or raises. They are not
     observed.
 
 Raises:
-    ValueError: An array has another shape, or a number is out of range.
-    StaleHandleError: A world is closed.
-    WorldLockedError: A world is in use.
+    ValueError: `start` was not called.
 )");
 }
 

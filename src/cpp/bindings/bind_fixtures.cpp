@@ -191,7 +191,7 @@ Raises:
         const b2Body* changed = world.change_body(self.id);
         world.structure_changed();
         for (const b2Fixture* f = changed->GetFixtureList(); f != nullptr; f = f->GetNext()) {
-          world.rays().set_material(f, checked);
+          world.set_material(f, checked);
         }
       },
       py::arg("material"), R"(
@@ -279,7 +279,7 @@ Raises:
       [](const FixtureHandle& self, const Numbers<3>& material) {
         const Material checked = checked_material(material);
         World& world = self.core();
-        world.rays().set_material(world.change_fixture(self.id), checked);
+        world.set_material(world.change_fixture(self.id), checked);
         world.structure_changed();
       },
       R"(

@@ -21,6 +21,8 @@ Raises:
     WorldLockedError: The world is stepping.
 )");
   world.def_property_readonly("closed", &World::closed, "Whether the world is closed.");
+  world.def_property("time_ns", &World::time, &World::set_time,
+                     "Simulated time [ns], settable; part of what `become_copy_of` copies.");
   world.def(
       "_step",
       [](World& self, double dt, int velocity_iterations, int position_iterations) {

@@ -30,6 +30,7 @@ void bind_motions(Classes& classes);
 void bind_crowd(pybind11::module_& module, Classes& classes);
 void bind_touches(Classes& classes);
 void bind_contacts(pybind11::module_& module, Classes& classes);
+void bind_copying(pybind11::module_& module);
 void bind_raycast(WorldClass& world);
 void bind_overlap(WorldClass& world);
 void bind_range_finder(pybind11::module_& module);

@@ -23,6 +23,7 @@ PYBIND11_MODULE(_core, module) {
   flatland::bind_crowd(module, classes);
   flatland::bind_touches(classes);
   flatland::bind_contacts(module, classes);
+  flatland::bind_copying(module);
   flatland::bind_raycast(classes.world);
   flatland::bind_overlap(classes.world);
   flatland::bind_jobs(module, classes);

@@ -15,6 +15,7 @@
 #include <string>
 #include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace flatland {
@@ -46,10 +47,16 @@ std::size_t processor_quota() {
   return static_cast<std::size_t>(std::ceil(std::min<double>(kMaxThreads, quota / period)));
 }
 
+}  // namespace
+
+std::size_t available_threads() {
+  return std::max<std::size_t>(1, std::min(allowed_processors(), processor_quota()));
+}
+
 // The jobs of one call.
-class Batch {
+class ThreadPool::Batch {
  public:
-  Batch(std::size_t count, const ThreadPool::Job& job) : count_(count), job_(job) {}
+  Batch(std::size_t count, Job job) : count_(count), job_(std::move(job)) {}
 
   // Carries out jobs until none is left.
   void work() {
@@ -73,18 +80,12 @@ class Batch {
 
  private:
   const std::size_t count_;
-  const ThreadPool::Job& job_;
+  const Job job_;
   std::atomic<std::size_t> next_{0};
   std::mutex mutex_;
   std::exception_ptr failure_;
   std::size_t failed_job_ = 0;
 };
-
-}  // namespace
-
-std::size_t available_threads() {
-  return std::max<std::size_t>(1, std::min(allowed_processors(), processor_quota()));
-}
 
 // The workers of one process.
 class ThreadPool::Crew {
@@ -104,8 +105,8 @@ class ThreadPool::Crew {
   bool is_of_this_process() const { return process_ == getpid(); }
   std::size_t available() const { return available_; }
 
-  // Works on a batch together with up to `helpers` workers. Returns false if the crew is busy.
-  bool try_work(Batch& batch, std::size_t helpers) {
+  // Makes up to `helpers` workers work on a batch. Returns false if the crew is busy.
+  bool try_begin(Batch& batch, std::size_t helpers) {
     if (is_busy_.exchange(true, std::memory_order_acquire)) return false;
     hire(helpers);
     helpers = std::min(helpers, workers_.size());
@@ -115,7 +116,11 @@ class ThreadPool::Crew {
       vacancies_ = helpers;
     }
     for (std::size_t i = 0; i < helpers; ++i) work_.notify_one();
-    batch.work();
+    return true;
+  }
+
+  // Waits until the workers have left the batch.
+  void end() {
     {
       // Workers that have not woken up yet are no longer needed.
       std::unique_lock<std::mutex> lock(mutex_);
@@ -124,7 +129,6 @@ class ThreadPool::Crew {
       done_.wait(lock, [this] { return working_ == 0; });
     }
     is_busy_.store(false, std::memory_order_release);
-    return true;
   }
 
  private:
@@ -192,18 +196,37 @@ ThreadPool::Crew& ThreadPool::crew() {
   return *known;
 }
 
-void ThreadPool::parallel_for(std::size_t jobs, std::size_t num_threads, const Job& job) {
-  if (jobs == 0) return;
-  Batch batch(jobs, job);
-  bool is_done = false;
+void ThreadPool::parallel_for(std::size_t jobs, std::size_t num_threads, Job job) {
+  start(jobs, num_threads, std::move(job))->finish();
+}
+
+std::unique_ptr<ThreadPool::Work> ThreadPool::start(std::size_t jobs, std::size_t num_threads,
+                                                    Job job) {
+  std::unique_ptr<Work> work(new Work(jobs, std::move(job)));
   if (jobs > 1 && num_threads != 1) {
     Crew& workers = crew();
     if (num_threads == 0) num_threads = workers.available();
     const std::size_t threads = std::min({num_threads, jobs, kMaxThreads});
-    is_done = threads > 1 && workers.try_work(batch, threads - 1);
+    if (threads > 1 && workers.try_begin(*work->batch_, threads - 1)) work->crew_ = &workers;
   }
-  if (!is_done) batch.work();
-  batch.rethrow();
+  return work;
+}
+
+ThreadPool::Work::Work(std::size_t jobs, Job job)
+    : batch_(std::make_unique<Batch>(jobs, std::move(job))) {}
+
+ThreadPool::Work::~Work() { complete(); }
+
+void ThreadPool::Work::finish() {
+  if (is_complete_) return;
+  complete();
+  batch_->rethrow();
+}
+
+void ThreadPool::Work::complete() {
+  if (std::exchange(is_complete_, true)) return;
+  batch_->work();
+  if (crew_ != nullptr) crew_->end();
 }
 
 }  // namespace flatland

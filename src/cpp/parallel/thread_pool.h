@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <functional>
+#include <memory>
 
 namespace flatland {
 
@@ -33,7 +34,12 @@ class ThreadPool {
   // carries out all jobs. The same happens if no thread can be created.
   //
   // After a fork, the child process starts workers of its own.
-  void parallel_for(std::size_t jobs, std::size_t num_threads, const Job& job);
+  void parallel_for(std::size_t jobs, std::size_t num_threads, Job job);
+
+  class Work;
+  // The same in two parts: the workers begin with the jobs, and `Work::finish` does the rest. The
+  // pool must exist until then.
+  std::unique_ptr<Work> start(std::size_t jobs, std::size_t num_threads, Job job);
 
   // Ends the workers; the next call starts new ones. Like the destructor, it must not be called
   // while jobs are carried out.
@@ -41,11 +47,32 @@ class ThreadPool {
 
  private:
   class Crew;
+  class Batch;
 
   // The workers of this process, created if there are none.
   Crew& crew();
 
   std::atomic<Crew*> crew_{nullptr};
+};
+
+// Jobs that workers have begun to carry out.
+class ThreadPool::Work {
+ public:
+  ~Work();
+  Work(const Work&) = delete;
+  Work& operator=(const Work&) = delete;
+
+  // Carries out the jobs that no worker has begun, waits for the others, and rethrows. Idempotent.
+  void finish();
+
+ private:
+  friend class ThreadPool;
+  Work(std::size_t jobs, Job job);
+  void complete();
+
+  std::unique_ptr<Batch> batch_;
+  Crew* crew_ = nullptr;  // which works on the batch
+  bool is_complete_ = false;
 };
 
 }  // namespace flatland

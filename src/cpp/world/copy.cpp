@@ -63,15 +63,17 @@ class EngineCopier {
     return contacts_;
   }
 
-  // Whether the arrays of the broad phases have the same size.
+  // Whether the array of the broad phase is large enough.
   bool can_revert() const {
-    return get<members::TreeCapacity>(tree_of(source_)) ==
-           get<members::TreeCapacity>(tree_of(target_));
+    return UsedNodes(tree_of(source_)).count <= get<members::TreeCapacity>(tree_of(target_));
   }
 
   // The same as `copy`, in two parts, for a target with the structure of the source. The second
   // part cannot fail.
-  void begin_revert() { create_contacts(); }
+  void begin_revert() {
+    is_revert_ = true;
+    create_contacts();
+  }
   void revert() {
     destroy_contacts();
     revert_bodies();
@@ -290,20 +292,59 @@ class EngineCopier {
     return get<members::BroadPhaseTree>(world.GetContactManager().m_broadPhase);
   }
 
-  // Copies all but the proxies of the leaves.
+  // The nodes of a tree without those at the end of its array that were never used: they are the
+  // last ones in the list of free nodes, in ascending order. The list of a tree with a larger or
+  // smaller array continues in the same way.
+  struct UsedNodes {
+    explicit UsedNodes(const b2DynamicTree& tree) {
+      const b2TreeNode* nodes = get<members::TreeNodes>(tree);
+      const int32 capacity = get<members::TreeCapacity>(tree);
+      int32 previous = b2_nullNode;
+      int32 first = capacity;
+      for (int32 i = get<members::TreeFreeList>(tree); i != b2_nullNode; i = nodes[i].next) {
+        if (previous == b2_nullNode || i != previous + 1) {
+          first = i;
+          last_free = previous;
+        }
+        previous = i;
+      }
+      if (previous == capacity - 1) {
+        count = first;
+      } else {
+        count = capacity;
+        last_free = previous;
+      }
+    }
+
+    int32 count;
+    int32 last_free = b2_nullNode;  // the end of the list of those that are free
+  };
+
+  // Free nodes beyond the used ones: a small model can be added without a larger array.
+  static constexpr int32 kSpareNodes = 32;
+
+  // Copies all but the proxies of the leaves. A new array is as large as necessary.
   void copy_tree(const b2DynamicTree& from, b2DynamicTree& to) {
-    const int32 capacity = get<members::TreeCapacity>(from);
+    const UsedNodes used(from);
     b2TreeNode*& nodes = get<members::TreeNodes>(to);
-    resize(nodes, get<members::TreeCapacity>(to), capacity);
+    int32& capacity = get<members::TreeCapacity>(to);
+    if (!is_revert_) resize(nodes, capacity, used.count + kSpareNodes);
     const b2TreeNode* from_nodes = get<members::TreeNodes>(from);
-    for (int32 i = 0; i < capacity; ++i) {
+    for (int32 i = 0; i < used.count; ++i) {
       void* proxy = nodes[i].userData;
       nodes[i] = from_nodes[i];
       nodes[i].userData = proxy;
     }
+    for (int32 i = used.count; i < capacity; ++i) {
+      nodes[i].next = i + 1 < capacity ? i + 1 : b2_nullNode;
+      nodes[i].height = -1;
+    }
     assign<members::TreeRoot>(from, to);
     assign<members::TreeNodeCount>(from, to);
     assign<members::TreeFreeList>(from, to);
+    const int32 next = used.count < capacity ? used.count : b2_nullNode;
+    (used.last_free == b2_nullNode ? get<members::TreeFreeList>(to) : nodes[used.last_free].next) =
+        next;
     assign<members::TreeInsertionCount>(from, to);
   }
 
@@ -345,6 +386,7 @@ class EngineCopier {
   Fixtures& fixtures_;
   Joints& joints_;
   std::unordered_map<const b2Contact*, const b2Contact*> contacts_;
+  bool is_revert_ = false;
   std::vector<b2Contact*> created_;  // the copies of contacts, in the order of the list
 };
 
@@ -402,6 +444,7 @@ void World::replace_others(const World& source, OtherParts parts) {
   jobs_ = std::move(parts.jobs);
   invalid_ = std::move(parts.invalid);
   last_step_time_ = source.last_step_time_;
+  set_time(source.time());
 }
 
 void World::clear() {

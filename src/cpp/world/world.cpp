@@ -93,6 +93,7 @@ void World::close() {
   invalid_.clear();
   jobs_.clear();
   engine_.reset();
+  interrupt();
 }
 
 StepReport World::step(double dt, int velocity_iterations, int position_iterations,
@@ -147,7 +148,7 @@ RunResult World::run(const Run& run) {
   if (!run.continues) stage_ = Stage::kStart;
   while (result.steps < run.n) {
     if (stage_ == Stage::kStart) {
-      if (interrupted_.load(std::memory_order_relaxed)) break;
+      if (is_interrupted()) break;
       if (++untimed > kMostUntimed || last_step_time_ > kLongRun / kMostUntimed) {
         untimed = 0;
         const std::chrono::duration<double> elapsed = Clock::now() - start;
@@ -217,14 +218,14 @@ bool World::hand_back(Phase phase, RunResult& result, double dt) {
 void World::interrupt() {
   {
     const std::lock_guard<std::mutex> lock(interrupt_mutex_);
-    interrupted_ = true;
+    ++interrupts_;
   }
   interrupt_.notify_all();
 }
 
 bool World::wait_until(std::chrono::steady_clock::time_point time) {
   std::unique_lock<std::mutex> lock(interrupt_mutex_);
-  return !interrupt_.wait_until(lock, time, [this] { return interrupted_.load(); });
+  return !interrupt_.wait_until(lock, time, [this] { return is_interrupted(); });
 }
 
 std::vector<Id> World::still_invalid() const {
@@ -391,6 +392,12 @@ void World::fixture_changed(const b2Fixture* fixture) {
   auto* body = const_cast<b2Body*>(fixture->GetBody());
   body->SetAwake(body->GetType() != b2_staticBody);
   wake_neighbours(body);
+}
+
+void World::set_material(const b2Fixture* fixture, const Material& material) {
+  rays_.set_material(fixture, material);
+  // Scans may be random from now on.
+  interrupt();
 }
 
 World::ExclusiveUse::ExclusiveUse(World& world, const char* activity) : world_(&world) {

@@ -104,11 +104,22 @@ class World final : private b2DestructionListener {
   // Makes `run` return after the current step, and `wait_until` at once; safe from any thread. It
   // has an effect until `clear_interrupt` is called.
   void interrupt();
-  void clear_interrupt() { interrupted_ = false; }
+  // Returns the number of interrupts that it clears.
+  std::uint64_t clear_interrupt() {
+    const std::uint64_t count = interrupts_.load();
+    cleared_ = count;
+    return count;
+  }
+  // Returns the number of interrupts so far. As long as it does not change, nothing outside of the
+  // core has to be called before a run that code outside of the core has permitted.
+  std::uint64_t interrupts() const { return interrupts_.load(std::memory_order_relaxed); }
   // Waits for a time unless interrupted. Returns whether the time has come. Requires no use of the
   // world.
   bool wait_until(std::chrono::steady_clock::time_point time);
 
+  // Simulated time [ns], which the caller of `run` sets; safe from any thread.
+  std::int64_t time() const { return time_.load(std::memory_order_relaxed); }
+  void set_time(std::int64_t time) { time_.store(time, std::memory_order_relaxed); }
   // Duration of the last step in wall time [s], an estimate of that of the next one.
   double last_step_time() const { return last_step_time_; }
   // Returns the expected wall time of a run up to its first call [s].
@@ -151,6 +162,7 @@ class World final : private b2DestructionListener {
   // To be called after each change of what the world consists of: objects, the properties of
   // fixtures, and the poses of static bodies.
   void structure_changed();
+  void set_material(const b2Fixture* fixture, const Material& material);
   // To be called after a change of the filter or the sensor flag of a fixture.
   void fixture_changed(const b2Fixture* fixture);
 
@@ -227,6 +239,7 @@ class World final : private b2DestructionListener {
   // the result contains what is to be done.
   bool perform(const Run& run, std::int64_t time, RunResult& result);
   bool hand_back(Phase phase, RunResult& result, double dt);
+  bool is_interrupted() const { return interrupts() != cleared_.load(std::memory_order_relaxed); }
   [[noreturn]] void throw_locked() const;
   void wait_for_readers() const;
 
@@ -249,7 +262,9 @@ class World final : private b2DestructionListener {
   double last_step_time_ = 1.0;  // the first step may be long
   std::vector<Id> invalid_;      // bodies that the last step left so
 
-  std::atomic<bool> interrupted_{false};
+  std::atomic<std::int64_t> time_{0};
+  std::atomic<std::uint64_t> interrupts_{0};
+  std::atomic<std::uint64_t> cleared_{0};  // number of interrupts without an effect
   std::mutex interrupt_mutex_;
   std::condition_variable interrupt_;
   std::atomic<int> users_{0};  // kExclusive, or the number of shared uses

@@ -12,6 +12,7 @@ import pytest
 
 from flatland.copying.kinds import UncopyableError
 from flatland.copying.record import SavedObjects
+from flatland.physics import changed_contents
 
 
 class Derived(list[Any]):
@@ -69,3 +70,60 @@ def test_excluded_objects_and_connections_are_not_saved() -> None:
 def test_an_object_with_a_hidden_state_is_refused() -> None:
     with pytest.raises(UncopyableError, match="an object of type generator"):
         SavedObjects([[(number for number in range(3))]], {})
+
+
+class Slotted:
+    """An object with slots."""
+
+    __slots__ = ("first", "second")
+
+
+def test_only_contents_that_are_other_objects_are_written() -> None:
+    slotted = Slotted()
+    slotted.first = 1.0
+    holder = Holder((), None)
+    queue, counts = collections.deque([1, 2]), collections.Counter("aab")
+    parts: list[Any] = [slotted, holder, queue, counts, []]
+    saved = SavedObjects([parts], {})
+    # Values that are equal are other objects.
+    holder.parts, holder.array = [], 0
+    slotted.first, slotted.second = True, 2
+    queue.rotate()
+    counts["c"] += 1
+    del counts["a"]
+    parts.append(3)
+    assert saved.write_back() is None
+    assert holder.parts == ()
+    assert slotted.first is not True
+    assert not hasattr(slotted, "second")
+    assert list(queue) == [1, 2]
+    assert counts == collections.Counter("aab")
+    assert len(parts) == 5
+    del slotted.first
+    vars(holder)["late"] = 1
+    saved.write_back()
+    assert slotted.first == 1.0
+    assert vars(holder) == {"parts": (), "array": None}
+
+
+def test_changed_contents_names_the_objects() -> None:
+    missing, value = object(), [1.0]
+    items, attributes = [value, value], Holder((), value)
+    members = (Slotted.first, Slotted.second)  # type: ignore[attr-defined]
+    slotted = Slotted()
+    slotted.first = value
+    entries = [
+        (items, None, (), (), [], [value, value]),
+        (attributes, {"parts": (), "array": value}, (), (), [], None),
+        (slotted, None, (), members, [value, missing], None),
+    ]
+    assert changed_contents(entries, missing) == []
+    items[1] = [1.0]
+    assert changed_contents(entries, missing) == [0]
+    attributes.extra = 1  # type: ignore[attr-defined]
+    slotted.second = 2
+    assert changed_contents(entries, missing) == [0, 1, 2]
+    entries[1] = (attributes, {"parts": (), "array": value}, ("extra",), (), [], None)
+    assert changed_contents(entries, missing) == [0, 2]
+    with pytest.raises(ValueError, match="an entry must have 6 members"):
+        changed_contents([(items, None)], missing)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,10 +11,11 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from flatland.errors import StaleHandleError
+from flatland.errors import StaleHandleError, WorldError, WorldLockedError
 from flatland.gym import FlatlandVectorEnv
 from flatland.gym.endings import Arrived
 from flatland.runtime.observer import WorldObserver
+from flatland.values import Twist
 
 Make = Callable[..., Any]
 COUNT, STEPS = 3, 60
@@ -115,11 +117,11 @@ def test_the_core_performs_all_steps_alone_after_those_with_first_updates(
     for _ in range(2):
         env.step(np.full((COUNT, 2), 0.1))
     batch = env._episodes._batch
-    assert batch.perform(commands, ones, 20).tolist() == []
+    assert batch.perform(commands, ones, 20, lambda: None).tolist() == []
     env._stage.worlds[1].add_observer(Watcher())
-    assert batch.perform(commands, ones, 20).tolist() == [1]
+    assert batch.perform(commands, ones, 20, lambda: None).tolist() == [1]
     env._stage.worlds[2].physics.pre_solve = lambda *_: None
-    assert batch.perform(commands, ones, 20).tolist() == [1, 2]
+    assert batch.perform(commands, ones, 20, lambda: None).tolist() == [1, 2]
 
 
 def test_a_refused_call_of_the_core_advances_no_world(make: Make, room: Path) -> None:
@@ -134,3 +136,121 @@ def test_a_refused_call_of_the_core_advances_no_world(make: Make, room: Path) ->
         env.step(np.ones((COUNT, 2)))
     assert [world.time for world in env._stage.worlds] == times
     assert not any(world.requests.lock._is_owned() for world in env._stage.worlds)
+
+
+def test_a_command_has_the_last_value_of_the_core(make: Make, room: Path) -> None:
+    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
+    env.reset(seed=0)
+    commands = [agent.command for agent in env.episodes.agents]
+    for step in range(1, 5):
+        actions = np.full((COUNT, 2), 0.1 * step)
+        env.step(actions)
+        low, high = env.episodes.situation.low, env.episodes.situation.high
+        forward, turn = low + (actions[0] + 1.0) * (0.5 * (high - low))
+        assert [command.value for command in commands] == [Twist(forward, 0.0, turn)] * COUNT
+        assert [command.received for command in commands] == [step] * COUNT
+    world = env.worlds[0]
+    saved, clone = world.snapshot(), world.clone()
+    env.step(np.zeros((COUNT, 2)))
+    assert (commands[0].received, commands[1].received) == (5, 5)
+    world.restore(saved)
+    assert (commands[0].value, commands[0].received) == (Twist(forward, 0.0, turn), 4)
+    topic = commands[0].topic
+    assert clone.command(topic).value == Twist(forward, 0.0, turn)
+    clone.close()
+
+
+@pytest.mark.parametrize("change", ["on_set", "iterations", "pre_solve", "pause"])
+def test_changes_from_outside_end_the_permission_of_the_core(
+    make: Make, room: Path, change: str
+) -> None:
+    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
+    env.reset(seed=0)
+    actions, ones = np.full((COUNT, 2), 0.1), np.ones(COUNT, np.bool_)
+    for _ in range(2):
+        env.step(actions)
+    world = env.worlds[1]
+    values: list[Twist] = []
+    if change == "on_set":
+        env.episodes.agents[1].command.on_set = lambda _, value: values.append(value)
+    elif change == "iterations":
+        world.velocity_iterations += 1
+    elif change == "pre_solve":
+        world.physics.pre_solve = lambda *_: None
+    else:
+        world.pause()
+    batch = env._episodes._batch
+    for count in (1, 2):
+        assert batch.perform(actions, ones, 20, lambda: None).tolist() == [1]
+        assert len(values) == (count if change == "on_set" else 0)
+
+
+def test_a_hook_cannot_step_the_environment(make: Make, room: Path) -> None:
+    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
+    env.reset(seed=0)
+    actions = np.zeros((COUNT, 2))
+    errors: list[str] = []
+
+    def step() -> None:
+        with pytest.raises(WorldError, match="must not be called from a plugin's hook") as caught:
+            env.step(actions)
+        errors.append(str(caught.value))
+
+    drive = next(iter(env.worlds[1].models)).plugins[0]
+    env.worlds[1].plugin_host.jobs.set_later(drive, step)
+    env.worlds[1].step()
+    assert len(errors) == 1
+    env.step(actions)
+
+
+def test_requests_wait_for_the_end_of_all_steps(make: Make, room: Path) -> None:
+    env = create(make, room)
+    env.reset(seed=0)
+    world, posted = env.worlds[1], threading.Event()
+    world.requests._on_post = posted.set
+    with env.worlds[0].requests.lock:
+        mover = threading.Thread(target=world.move_model, args=("robot", (3, 2, 1), "allow"))
+        mover.start()
+        # The lock is that of all worlds: the request waits, and the next step carries it out.
+        assert posted.wait(60)
+        assert mover.is_alive()
+    env.step(np.tile([-1.0, 0.0], (COUNT, 1)))
+    mover.join(60)
+    assert not mover.is_alive()
+    assert env.poses[1].tolist() == pytest.approx([3, 2, 1], abs=1e-4)
+
+
+def test_the_next_episodes_begin_while_other_worlds_step(make: Make, room: Path) -> None:
+    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000, num_threads=2)
+    env.reset(seed=0)
+    actions, acting = np.full((COUNT, 2), 0.1), np.array([True, False, True])
+    env.step(actions)
+    refused: list[int] = []
+
+    def meanwhile() -> None:
+        for row, world in enumerate(env.worlds):
+            try:
+                world.move_model("robot", (3.0, 2.0, 1.0), "allow")
+            except WorldLockedError:
+                refused.append(row)
+
+    batch = env._episodes._batch
+    assert batch.perform(actions, acting, 20, meanwhile).tolist() == []
+    assert refused == [0, 2]
+    assert env.poses[1].tolist() == pytest.approx([3.0, 2.0, 1.0])
+    assert [world.time for world in env.worlds] == pytest.approx([0.2, 0.1, 0.2])
+
+
+def test_an_exception_while_worlds_step_leaves_them_complete(make: Make, room: Path) -> None:
+    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
+    env.reset(seed=0)
+    actions, acting = np.full((COUNT, 2), 0.1), np.array([True, False, True])
+
+    def fail() -> None:
+        raise ValueError("no start")
+
+    with pytest.raises(ValueError, match="no start"):
+        env._episodes._batch.perform(actions, acting, 20, fail)
+    assert [world.time for world in env.worlds] == pytest.approx([0.1, 0.0, 0.1])
+    env.step(actions)
+    assert [world.time for world in env.worlds] == pytest.approx([0.2, 0.1, 0.2])

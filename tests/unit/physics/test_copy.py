@@ -179,6 +179,12 @@ def random_world(seed: int) -> PhysicsWorld:
     return world
 
 
+def add_circle(world: PhysicsWorld, rng: random.Random) -> PhysicsBody:
+    body = world.create_body("dynamic", (rng.uniform(-5, 5), rng.uniform(-5, 5), 0.0))
+    body.create_circle((0.0, 0.0), 0.1, density=1.0)
+    return body
+
+
 def step_all(*worlds: PhysicsWorld) -> None:
     for _ in range(STEPS // STEPS_OF_A_STATE):
         for world in worlds:
@@ -237,6 +243,28 @@ def test_a_world_becomes_what_it_was(seed: int, later: int) -> None:
     for _ in range(2):
         Calls(world, later).run(40)
         world.become_copy_of(frozen)
+    step_all(world, copy)
+
+
+@PROPERTY
+@given(seed=SEEDS, removed=st.integers(0, 30), added=st.integers(0, 120))
+def test_a_copy_with_a_smaller_tree_grows_like_its_original(
+    seed: int, removed: int, added: int
+) -> None:
+    """The array of the nodes of the broad phase of a copy has only a few free nodes."""
+    world = random_world(seed)
+    rng = random.Random(seed)
+    bodies = [add_circle(world, rng) for _ in range(40)]
+    for body in rng.sample(bodies, removed):
+        body.destroy()
+    copy = world.copy()
+    state = rng.getstate()
+    for each in (world, copy):
+        rng.setstate(state)
+        for _ in range(added):
+            add_circle(each, rng)
+    step_all(world, copy)
+    world.become_copy_of(copy)
     step_all(world, copy)
 
 
