@@ -179,9 +179,9 @@ def test_changes_from_outside_end_the_permission_of_the_core(
         world.physics.pre_solve = lambda *_: None
     else:
         world.pause()
-    batch = env._episodes._batch
+    batch, commands = env._episodes._batch, np.zeros((COUNT, 3))
     for count in (1, 2):
-        assert batch.perform(actions, ones, 20, lambda: None).tolist() == [1]
+        assert batch.perform(commands, ones, 20, lambda: None).tolist() == [1]
         assert len(values) == (count if change == "on_set" else 0)
 
 
@@ -234,8 +234,8 @@ def test_the_next_episodes_begin_while_other_worlds_step(make: Make, room: Path)
             except WorldLockedError:
                 refused.append(row)
 
-    batch = env._episodes._batch
-    assert batch.perform(actions, acting, 20, meanwhile).tolist() == []
+    batch, commands = env._episodes._batch, np.tile([0.1, 0.0, 0.1], (COUNT, 1))
+    assert batch.perform(commands, acting, 20, meanwhile).tolist() == []
     assert refused == [0, 2]
     assert env.poses[1].tolist() == pytest.approx([3.0, 2.0, 1.0])
     assert [world.time for world in env.worlds] == pytest.approx([0.2, 0.1, 0.2])
@@ -249,8 +249,9 @@ def test_an_exception_while_worlds_step_leaves_them_complete(make: Make, room: P
     def fail() -> None:
         raise ValueError("no start")
 
+    commands = np.tile([0.1, 0.0, 0.1], (COUNT, 1))
     with pytest.raises(ValueError, match="no start"):
-        env._episodes._batch.perform(actions, acting, 20, fail)
+        env._episodes._batch.perform(commands, acting, 20, fail)
     assert [world.time for world in env.worlds] == pytest.approx([0.1, 0.0, 0.1])
     env.step(actions)
     assert [world.time for world in env.worlds] == pytest.approx([0.2, 0.1, 0.2])
