@@ -30,11 +30,11 @@ constexpr double kMostTurn = 0.5;  // tangent of the greatest angle by which peo
 
 bool Crowd::approaches(std::size_t i, const Choice& choice, std::size_t gate, Approach& approach) {
   const Person& person = people_[i];
-  const Gate& g = (*gates_)[gate];
+  const Gate& g = ways_->gates()[gate];
   const Vec offset = person.position - g.center;
   if (square(offset) > kApproach * kApproach) return false;
   // The way is taken at the center: next to a door post, the way may lead in any direction.
-  const double cosine = dot(way_to(target_of(person), g.center), g.axis);
+  const double cosine = dot(way_of(target_of(person))->from_gate(gate), g.axis);
   if (std::fabs(cosine) < kThrough) return false;
   const double along = dot(offset, g.axis);
   const bool is_inside = std::fabs(along) < g.half_depth + kThreshold &&
@@ -47,7 +47,7 @@ bool Crowd::approaches(std::size_t i, const Choice& choice, std::size_t gate, Ap
 
 Crowd::Choice Crowd::step_aside(const Person& person, const Choice& choice,
                                 const Approach& approach) const {
-  const Gate& gate = (*gates_)[approach.gate];
+  const Gate& gate = ways_->gates()[approach.gate];
   const Vec ahead = approach.direction == 1 ? gate.axis : -gate.axis;
   const Vec offset = person.position - gate.center;
   const double distance = -dot(offset, ahead) - gate.half_depth;
@@ -62,7 +62,8 @@ Crowd::Choice Crowd::step_aside(const Person& person, const Choice& choice,
 }
 
 void Crowd::keep_doors_clear(std::vector<Choice>& choices, std::int64_t step, double dt) {
-  const std::vector<Gate>& gates = *gates_;
+  if (ways_ == nullptr || ways_->gates().empty()) return;
+  const std::vector<Gate>& gates = ways_->gates();
   std::vector<Demand> demands(gates.size());
   for (Demand& demand : demands) {
     for (double& nearest : demand.nearest) nearest = std::numeric_limits<double>::infinity();

@@ -70,13 +70,13 @@ Walls::Walls(std::vector<Segment> segments) : segments_(std::move(segments)) {
 }
 
 std::int64_t Walls::column_of(double x) const {
-  const double column = std::floor((x - low_.x) / cell_);
+  const double column = (x - low_.x) / cell_;
   return static_cast<std::int64_t>(
       std::min(std::max(column, 0.0), static_cast<double>(columns_ - 1)));
 }
 
 std::int64_t Walls::row_of(double y) const {
-  const double row = std::floor((y - low_.y) / cell_);
+  const double row = (y - low_.y) / cell_;
   return static_cast<std::int64_t>(std::min(std::max(row, 0.0), static_cast<double>(rows_ - 1)));
 }
 
@@ -94,10 +94,12 @@ void Walls::visit_cells(Vec low, Vec high, Visit&& visit) const {
 void Walls::find_near(Vec p, double range, std::vector<NearPoint>& found) const {
   if (empty()) return;
   const Vec margin{range, range};
+  const double most = range * range * (1.0 + 1e-9);  // including a rounding error
   visit_cells(p - margin, p + margin, [&](std::int64_t column, std::int64_t row) {
     const auto cell = static_cast<std::size_t>(row * columns_ + column);
     for (std::uint32_t k = starts_[cell]; k < starts_[cell + 1]; ++k) {
       const Vec point = nearest_on(segments_[members_[k]], p);
+      if (square(point - p) > most) continue;
       // A segment can be in several cells, and is found in the cell of the nearest point.
       if (column_of(point.x) != column || row_of(point.y) != row) continue;
       const double distance = length(point - p);
@@ -121,16 +123,27 @@ double Walls::distance(Vec p, double range) const {
 
 bool Walls::is_clear(Vec from, Vec to) const {
   if (empty()) return true;
-  bool is_clear = true;
-  visit_cells({std::min(from.x, to.x), std::min(from.y, to.y)},
-              {std::max(from.x, to.x), std::max(from.y, to.y)},
-              [&](std::int64_t column, std::int64_t row) {
-                const auto cell = static_cast<std::size_t>(row * columns_ + column);
-                for (std::uint32_t k = starts_[cell]; is_clear && k < starts_[cell + 1]; ++k) {
-                  is_clear = !crosses(segments_[members_[k]], from, to);
-                }
-              });
-  return is_clear;
+  constexpr double kRounding = 1e-6;  // m
+  const auto [low, high] = from.y < to.y ? std::pair(from, to) : std::pair(to, from);
+  const double slope = (high.x - low.x) / std::max(high.y - low.y, kRounding);
+  const std::int64_t last_row = row_of(high.y);
+  for (std::int64_t row = row_of(low.y); row <= last_row; ++row) {
+    // The part of the line in a row of cells. The first and the last row have no outer limit.
+    const double bottom = low_.y + static_cast<double>(row) * cell_;
+    double begin = low.x;
+    double end = high.x;
+    if (row > 0 && bottom > low.y) begin += slope * (bottom - low.y);
+    if (row + 1 < rows_ && bottom + cell_ < high.y) end -= slope * (high.y - bottom - cell_);
+    const std::int64_t last_column = column_of(std::max(begin, end) + kRounding);
+    for (std::int64_t column = column_of(std::min(begin, end) - kRounding); column <= last_column;
+         ++column) {
+      const auto cell = static_cast<std::size_t>(row * columns_ + column);
+      for (std::uint32_t k = starts_[cell]; k < starts_[cell + 1]; ++k) {
+        if (crosses(segments_[members_[k]], from, to)) return false;
+      }
+    }
+  }
+  return true;
 }
 
 void keep_sides(Vec p, std::vector<NearPoint>& points) {
