@@ -10,9 +10,9 @@
 //   right_of_way.cpp  who passes a door first, and on which side people pass each other
 //   giving_way.cpp    who makes room for whom
 //   motion.cpp        the velocity by a model, free of contacts, and the motion of the legs
-// Parts without a state: flow_field and ways (ways on a grid), walls and surroundings (what is
-// avoided), gates (doors), social_force and orca with half_planes (the models), gait (legs),
-// random.
+// redraw.cpp contains the first places of people. Parts without a state: flow_field and ways (ways
+// on a grid), walls and surroundings (what is avoided), gates (doors), social_force and orca with
+// half_planes (the models), gait (legs), random.
 #pragma once
 
 #include <cstddef>
@@ -52,6 +52,10 @@ class Crowd {
   std::uint32_t add_route(const Route& route);
   // Adds people who walk together; the list must not be empty.
   void add_party(std::uint32_t route, std::uint32_t first_leg, const std::vector<Person>& people);
+  // Draws new places, headings and first waypoints for all people whose places are drawn, with the
+  // current key; see redraw.cpp. Returns the body of a person for whom there is no free place, and
+  // changes nothing in this case; returns 0 on success.
+  Id redraw(World& world);
   // Does nothing if the body is not that of a person. A party ends with its last member.
   void remove_person(Id body);
   void set_key(std::uint64_t key) { settings_.key = key; }
@@ -93,6 +97,17 @@ class Crowd {
   const Way* way_of(std::uint32_t waypoint);
   Vec way_to(std::uint32_t waypoint, Vec p);
   double draw(std::uint64_t& draws, std::uint64_t stream, Span span);
+
+  // redraw.cpp: the first places of people.
+  struct Spot {
+    Vec position;
+    double radius = 0.0;
+  };
+
+  bool is_free(const Spot& spot, const std::vector<Spot>& taken) const;
+  bool draw_spot(std::size_t i, const std::vector<Spot>& taken, Spot& spot);
+  void arrange(const std::vector<std::size_t>& people, std::vector<Spot>& spots) const;
+  void begin_again(World& world, std::size_t i, Vec position);
 
   // routes.cpp: where a person wants to walk.
   Choice choose(Person& person, std::int64_t step, double dt, double period);

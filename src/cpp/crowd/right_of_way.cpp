@@ -33,16 +33,17 @@ bool Crowd::approaches(std::size_t i, const Choice& choice, std::size_t gate, Ap
   const Gate& g = ways_->gates()[gate];
   const Vec offset = person.position - g.center;
   if (square(offset) > kApproach * kApproach) return false;
-  // The way is taken at the center: next to a door post, the way may lead in any direction.
-  const double cosine = dot(way_of(target_of(person))->from_gate(gate), g.axis);
-  if (std::fabs(cosine) < kThrough) return false;
   const double along = dot(offset, g.axis);
   const bool is_inside = std::fabs(along) < g.half_depth + kThreshold &&
                          std::fabs(cross(g.axis, offset)) < g.half_width;
+  const bool is_ahead = dot(choice.direction, -offset) > kAhead * length(offset);
+  if (!is_inside && !is_ahead) return false;
+  // The way is taken at the center: next to a door post, the way may lead in any direction.
+  const double cosine = dot(way_of(target_of(person))->from_gate(gate), g.axis);
+  if (std::fabs(cosine) < kThrough) return false;
   approach = {i, gate, cosine > 0.0 ? 1 : 0, is_inside};
   if (is_inside) return true;
-  return cosine * along < 0.0 && dot(choice.direction, -offset) > kAhead * length(offset) &&
-         surroundings_.walls().is_clear(person.position, g.center);
+  return cosine * along < 0.0 && surroundings_.walls().is_clear(person.position, g.center);
 }
 
 Crowd::Choice Crowd::step_aside(const Person& person, const Choice& choice,
