@@ -32,7 +32,6 @@ bool Crowd::approaches(std::size_t i, const Choice& choice, std::size_t gate, Ap
   const Person& person = people_[i];
   const Gate& g = ways_->gates()[gate];
   const Vec offset = person.position - g.center;
-  if (square(offset) > kApproach * kApproach) return false;
   const double along = dot(offset, g.axis);
   const bool is_inside = std::fabs(along) < g.half_depth + kThreshold &&
                          std::fabs(cross(g.axis, offset)) < g.half_width;
@@ -77,6 +76,7 @@ void Crowd::keep_doors_clear(std::vector<Choice>& choices, std::int64_t step, do
         std::lower_bound(gates.begin(), gates.end(), x - kApproach,
                          [](const Gate& gate, double least) { return gate.center.x < least; });
     for (auto gate = first; gate != gates.end() && gate->center.x <= x + kApproach; ++gate) {
+      if (square(people_[i].position - gate->center) > kApproach * kApproach) continue;
       Approach approach;
       const auto index = static_cast<std::size_t>(gate - gates.begin());
       if (!approaches(i, choices[i], index, approach)) continue;
