@@ -43,6 +43,7 @@ print(int(re.search(r"VmHWM:\\s+(\\d+) kB", open("/proc/self/status").read())[1]
 def rows(unit: float) -> list[Row]:
     """Measures steps of one and of many environments with resets, and the memory of 256."""
     found = []
+    seconds: dict[tuple[str, int], float] = {}
     for env, count, bar in (
         (NAME, 1, 0.05),
         (NAME, 16, None),
@@ -55,6 +56,9 @@ def rows(unit: float) -> list[Row]:
         name = f"{env}, {count} environments in a vector, step of one of them"
         note = f"{step.rate}, on {os.cpu_count()} cores"
         found.append(Row(name, step.seconds / unit, "U", bar, note=note))
+        seconds[env, count] = step.seconds
+    ratio = seconds["flatland/Crowd-v0", 16] / seconds[NAME, 16]
+    found.append(Row(f"flatland/Crowd-v0 against {NAME}, 16 environments", ratio, "times", 3.0))
     # Robots do not wait for others: their episodes end at goals only.
     fleet = _step(flatland.gym.make_vec("flatland/Fleet-v0", 16, num_robots=4, ending=Arrived()))
     name = "flatland/Fleet-v0, 16 worlds with 4 robots in a vector, step of one robot"

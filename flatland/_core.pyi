@@ -1085,6 +1085,7 @@ class Crowd(Handle):
         *,
         stop_interval: float = 0.0,
         stop: Sequence[float] = (0.0, 0.0),
+        area: tuple[float, float, float, float] | None = None,
     ) -> int:
         """Adds a route and returns its number.
 
@@ -1093,9 +1094,11 @@ class Crowd(Handle):
             order: The order in which they are visited: `loop`, `back_and_forth`, `random` or `once`.
             stop_interval: Mean time between two stops on the way [s], 0 for none.
             stop: Shortest and longest duration of a stop [s].
+            area: Area (x_min, y_min, x_max, y_max) of the places that `redraw` draws [m], world frame; None
+                for the area of the walls, which must exist then.
 
         Raises:
-            ValueError: A waypoint or the order does not exist.
+            ValueError: A waypoint or the order does not exist, or a coordinate is not finite.
         """
     def reach(self, waypoint: int) -> int:
         """Returns the number of cells of the planning grid from which a way leads to a waypoint."""
@@ -1132,6 +1135,16 @@ class Crowd(Handle):
         """
     def set_key(self, key: int) -> None:
         """Sets the integer from which all further random numbers derive."""
+    def redraw(self) -> int | None:
+        """Draws new places, headings and first waypoints for the people with `Member.is_redrawn`.
+
+        The people stand there and begin their routes again. The places are at some distance from walls,
+        bodies and other people, and there is a way from them to the first waypoint of the route. They are a
+        function of the key, the walls, and the poses of other bodies and people.
+
+        Returns:
+            None, or the id of the body of a person for whom there is no free place. Nothing is changed then.
+        """
     @property
     def people(self) -> list[PersonState]:
         """All people in the order in which they were added."""
@@ -1381,6 +1394,20 @@ class PathController(Controller):
         """
     def set_key(self, key: int) -> None:
         """Sets the key of the random numbers, from 0 to 2^64 - 1."""
+    def place(self, share: float) -> None:
+        """Moves the body to where it is in a round of the waypoints.
+
+        Has no effect in mode `once`, and on a body that is not started.
+
+        Args:
+            share: Time since the initial pose as a share of the duration of a round, from 0 to 1. In mode
+                `random`, a round has as many motions as there are waypoints.
+
+        Raises:
+            ValueError: The share is out of range.
+            StaleHandleError: The body was destroyed.
+            WorldLockedError: The world is stepping.
+        """
     def restart(self) -> None:
         """Continues from the current pose of the body, which was moved."""
     @property
@@ -1413,6 +1440,20 @@ class TweenController(Controller):
         """
     def set_trigger(self, is_triggered: bool) -> None:
         """Sets the direction of the motion in mode `trigger`, from the next step on."""
+    def place(self, share: float) -> None:
+        """Moves the body to where it is in a period of the motion.
+
+        Has no effect in the modes `once` and `trigger`.
+
+        Args:
+            share: Time since the start as a share of the period, from 0 to 1; in mode `yoyo`, the period
+                contains the motion back.
+
+        Raises:
+            ValueError: The share is out of range.
+            StaleHandleError: The body was destroyed.
+            WorldLockedError: The world is stepping.
+        """
     @property
     def state(self) -> tuple[float, float, bool]:
         """Progress in 32 bits, exact progress, and whether the motion is forward."""

@@ -34,6 +34,7 @@ from flatland.runtime.observer import Observers, WorldObserver
 from flatland.runtime.placement import IfBlocked, Models, Placement
 from flatland.runtime.plugin_calls import recorded_method
 from flatland.runtime.plugin_host import PluginHost
+from flatland.runtime.randomization import randomize_plugins
 from flatland.runtime.requests import Requests
 from flatland.runtime.snapshot import Snapshots, WorldSnapshot
 from flatland.runtime.state_hash import state_hash
@@ -860,6 +861,30 @@ class World:
         self._changes.save_or_restore(
             "restore", lambda: snapshot.number, lambda: self._snapshots.restore(snapshot)
         )
+
+    def randomize(self, seed: int) -> None:
+        """Draws the start of an episode, usually after `restore`.
+
+        All plugins get new random numbers. People whose places were drawn get other places, and
+        models that follow paths or tweens are at other places of their motions, unless their
+        parameter `redraw` is false. Other models remain where they are. Equal seeds in equal states
+        give equal results, bit by bit. If a hook of a plugin calls this, it takes effect after the
+        step.
+
+        Args:
+            seed: Seed of all that is drawn.
+
+        Raises:
+            WorldError: The world is closed, or there are too few free places for people; other
+                plugins may have drawn already.
+            ValueError: The seed is negative.
+        """
+        checked_seed(seed)
+
+        def randomize() -> None:
+            randomize_plugins(self.models, self.plugins, np.random.default_rng(seed))
+
+        self._changes.make("randomize", {"seed": seed}, randomize)
 
     def clone(self) -> World:
         """Returns an independent copy of the world in its current state.

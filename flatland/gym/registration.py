@@ -10,7 +10,7 @@ from gymnasium.envs.registration import VectorizeMode
 from gymnasium.error import NameNotFound, UnsupportedMode
 
 from flatland.extras import require
-from flatland.gym.buildings import Buildings, RandomBuildings
+from flatland.gym.buildings import RandomBuildings
 from flatland.gym.settings import DEFAULT_STEPS
 
 if TYPE_CHECKING:
@@ -19,12 +19,11 @@ if TYPE_CHECKING:
     from flatland.gym.vector import FlatlandVectorEnv
 
 _BUILDINGS: Final = 16
-_CROWDS: Final = 8
 
 SINGLE: Final[dict[str, dict[str, Any]]] = {
     "flatland/Navigate-v0": {"world": "navigate"},
     "flatland/Corridor-v0": {"world": "corridor"},
-    "flatland/Crowd-v0": {"world": Buildings(["crowd"] * _CROWDS)},
+    "flatland/Crowd-v0": {"world": "crowd"},
     "flatland/Maze-v0": {"world": RandomBuildings("maze", _BUILDINGS)},
     "flatland/Warehouse-v0": {"world": RandomBuildings("warehouse", _BUILDINGS)},
 }

@@ -18,6 +18,7 @@ from flatland.drawing.render import MATPLOTLIB_LOCK, make_figure
 from flatland.gym.episodes import Episodes
 from flatland.gym.live_view import EpisodeView, check_live_view
 from flatland.gym.stock import Stock
+from flatland.runtime.randomization import randomize_plugins
 
 if TYPE_CHECKING:
     from flatland.geometry import Vector2
@@ -143,23 +144,22 @@ class Stage:
             self.episodes.set_task(task, firsts)
 
     def restore(self, number: int, rng: np.random.Generator) -> None:
-        """Returns a world to its state before any episode, with new random numbers of all plugins.
+        """Returns a world to its state before any episode, and draws what is random at its start.
 
         With several buildings, one is drawn first.
 
         Args:
             number: Index of the world.
             rng: Source of the building and of the seeds; the noise is a function of its state.
+
+        Raises:
+            WorldError: A plugin found no free place.
         """
         if len(self._stocks) > 1:
             self._enter(number, int(rng.integers(len(self._stocks))))
         world = self.worlds[number]
         world.restore(self._used[number].start)
-        for model in world.models:
-            for plugin in model.plugins:
-                plugin.reseed(rng)
-        for world_plugin in world.plugins:
-            world_plugin.reseed(rng)
+        randomize_plugins(world.models, world.plugins, rng)
         self.episodes.randomization.change_world(world, rng)
 
     def _enter(self, number: int, building: int) -> None:

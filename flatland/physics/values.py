@@ -223,6 +223,7 @@ class Member(NamedTuple):
         speed: Preferred speed [m/s].
         is_aware: Whether the person avoids dynamic bodies.
         phase: Phase of the gait, from 0 to 1.
+        is_redrawn: Whether `Crowd.redraw` draws another place.
     """
 
     body: PhysicsBody
@@ -231,6 +232,7 @@ class Member(NamedTuple):
     speed: float
     is_aware: bool
     phase: float
+    is_redrawn: bool = False
 
 
 class PersonState(NamedTuple):

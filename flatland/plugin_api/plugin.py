@@ -224,6 +224,20 @@ class FlatlandPlugin:
             stream.updates = word >> 2
             stream.begin_update()
 
+    def randomize(self, rng: np.random.Generator) -> None:
+        """Draws what is random at the start of an episode, after a snapshot was restored.
+
+        A plugin that draws more than random numbers, such as a place, overrides this method. The
+        plugins of models are called before those of the world.
+
+        Args:
+            rng: Equal states of it, in equal states of the world, give equal results.
+
+        Raises:
+            WorldError: There is no free place.
+        """
+        self.reseed(rng)
+
     def on_update(
         self,
         function: UpdateFunction,

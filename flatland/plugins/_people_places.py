@@ -50,7 +50,11 @@ class PeoplePlaces:
         else:
             waypoints = self._add_random_places(group)
         route = self._crowd.add_route(
-            waypoints, group.order, stop_interval=group.stop_interval, stop=group.stop_time
+            waypoints,
+            group.order,
+            stop_interval=group.stop_interval,
+            stop=group.stop_time,
+            area=group.area,
         )
         self._routes[group.name] = (route, waypoints)
 

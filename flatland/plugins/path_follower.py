@@ -49,6 +49,7 @@ class PathFollower(ModelPlugin):
         mode = read_choice(config, "mode", MODES)
         linear, angular = _read_limits(config, ""), _read_limits(config, "angular_")
         wait: float = config.get("wait", "float", 0.0, minimum=0, finite=True)
+        self._redraws: bool = config.get("redraw", "bool", True)
         self._start_command: Command[bool] | None = None
         self._is_started: bool = config.get("start", "bool", True)
         self._starts = 0
@@ -98,6 +99,12 @@ class PathFollower(ModelPlugin):
         """Continues the random numbers from states that are drawn from a generator."""
         super().reseed(rng)
         self._controller.set_key(_draw_key(self.rng))
+
+    def randomize(self, rng: np.random.Generator) -> None:
+        """Draws new random numbers and, unless `redraw` is false, a place on the path."""
+        super().randomize(rng)
+        if self._redraws:
+            self._controller.place(self.rng.random())
 
     def model_moved(self, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
         """Continues to the same waypoint from the new pose."""

@@ -57,6 +57,7 @@ class Pedestrians(WorldPlugin):
         self._body_type = read_choice(config, "body_type", BODY_TYPES)
         self._mass = read_positive(config, "mass", 75.0)
         self._awareness = config.get("robot_awareness", "float", 1.0, minimum=0, maximum=1)
+        self._redraws: bool = config.get("redraw", "bool", True)
         bits = read_bits(config, self.world, self._layers, self._legs, self._body_type)
         self._frame_id: str = config.get("world_frame_id", "string", "map")
         self._crowd = self.control(
@@ -78,7 +79,7 @@ class Pedestrians(WorldPlugin):
             try:
                 self._places.add_route(group)
                 if group.count:
-                    self._spawn(group, self._places.find_free(group, group.count))
+                    self._spawn_anywhere(group, group.count)
             except WorldError as error:
                 raise group.reader.error(f'group "{group.name}": {error.message}') from error
 
@@ -191,7 +192,7 @@ class Pedestrians(WorldPlugin):
                 return self._spawn(chosen, np.array(poses, dtype=np.float64).reshape(-1, 3))
             if not 0 <= count <= 10000:
                 raise ValueError(f"count must be from 0 to 10000, got {count}")
-            return self._spawn(chosen, self._places.find_free(chosen, count))
+            return self._spawn_anywhere(chosen, count)
         except BaseException:
             generator.state = before
             raise
@@ -243,8 +244,18 @@ class Pedestrians(WorldPlugin):
         """Returns the names of people and of their groups by the id of the body."""
         return {person.body_id: self._names[person.body_id] for person in self._crowd.people}
 
-    def _spawn(self, group: Group, poses: DoubleArray) -> list[str]:
-        """Creates people of a group at poses (x, y, theta), shape (n, 3): all of them, or none."""
+    def _spawn_anywhere(self, group: Group, count: int) -> list[str]:
+        """Creates people of a group at random free places."""
+        return self._spawn(group, self._places.find_free(group, count), is_redrawn=self._redraws)
+
+    def _spawn(self, group: Group, poses: DoubleArray, *, is_redrawn: bool = False) -> list[str]:
+        """Creates people of a group: all of them, or none.
+
+        Args:
+            group: The group.
+            poses: Poses (x, y, theta) [m, rad], shape (n, 3).
+            is_redrawn: Whether `randomize` draws other places.
+        """
         count = len(poses)
         if not count:
             return []
@@ -278,6 +289,7 @@ class Pedestrians(WorldPlugin):
                         speed=float(speed),
                         is_aware=bool(aware[i]),
                         phase=float(phases[i]),
+                        is_redrawn=is_redrawn,
                     )
                 )
             self._places.add_party(group, members)
@@ -355,6 +367,21 @@ class Pedestrians(WorldPlugin):
         """Continues all random numbers from a state that is drawn from a generator."""
         super().reseed(rng)
         self._crowd.set_key(self._draw_key())
+
+    def randomize(self, rng: np.random.Generator) -> None:
+        """Draws new random numbers and, unless `redraw` is false, new places.
+
+        Raises:
+            WorldError: There are too few free places.
+        """
+        super().randomize(rng)
+        stranded = self._crowd.redraw()
+        if stranded is not None:
+            name, group = self._names[stranded]
+            raise WorldError(
+                f'plugin "{self.name}": no free place for "{name}" of group "{group}" with a way '
+                "to its waypoints"
+            )
 
     def state(self) -> object:
         """Returns the state of the crowd, and the numbers of the next people."""

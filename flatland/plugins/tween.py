@@ -11,6 +11,8 @@ from flatland.plugin_api.plugin import ModelPlugin
 from flatland.plugins._easing import EASINGS
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from flatland.config.reader import YamlReader
     from flatland.plugin_api.ports import Command
 
@@ -43,6 +45,7 @@ class Tween(ModelPlugin):
         if easing not in EASINGS:
             hint = did_you_mean(easing, EASINGS, "easings")
             raise at_key(config, "easing").error(f"Easing {easing} does not exist", hint)
+        self._redraws: bool = config.get("redraw", "bool", True)
         self._trigger = self._read_trigger(config)
         self._controller = self.control(
             self._body.control_tween(
@@ -77,6 +80,12 @@ class Tween(ModelPlugin):
     def _set_trigger(self) -> None:
         if self._trigger is not None:
             self._controller.set_trigger(self._trigger.value)
+
+    def randomize(self, rng: np.random.Generator) -> None:
+        """Draws new random numbers and, unless `redraw` is false, a place in the motion."""
+        super().randomize(rng)
+        if self._redraws:
+            self._controller.place(self.rng.random())
 
     def state(self) -> object:
         """Returns the progress along the path, and whether the motion is forward."""

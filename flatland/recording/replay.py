@@ -247,6 +247,7 @@ _CHANGES: Final[dict[str, Callable[..., object]]] = {
     "spawn_model": World.spawn_model,
     "move_model": World.move_model,
     "delete_model": World.delete_model,
+    "randomize": World.randomize,
     "reset": World.reset,
     "set_appearance": World.set_appearance,
     "set_layer_map": lambda world, name, source: world.set_layer_map(name, source),

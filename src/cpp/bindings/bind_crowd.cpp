@@ -110,6 +110,7 @@ crowd::Person to_person(World& world, const py::handle& member) {
   person.is_aware = member.attr("is_aware").cast<bool>();
   person.phase = member.attr("phase").cast<double>();
   person.phase -= std::floor(person.phase);
+  person.is_redrawn = member.attr("is_redrawn").cast<bool>();
   if (!(person.radius > 0.0) || !(person.speed > 0.0)) {
     throw py::value_error("radius and speed must be positive");
   }
@@ -144,7 +145,8 @@ std::uint32_t add_waypoint(const CrowdHandle& handle, const PyPoint& low, const 
 }
 
 std::uint32_t add_route(const CrowdHandle& handle, std::vector<std::uint32_t> waypoints,
-                        const std::string& order, double stop_interval, const PyPoint& stop) {
+                        const std::string& order, double stop_interval, const PyPoint& stop,
+                        const std::optional<std::tuple<double, double, double, double>>& area) {
   Crowd& crowd = changed_crowd(handle);
   if (waypoints.empty()) throw py::value_error("a route needs waypoints");
   for (const std::uint32_t waypoint : waypoints) {
@@ -160,6 +162,11 @@ std::uint32_t add_route(const CrowdHandle& handle, std::vector<std::uint32_t> wa
                                {"once", Order::kOnce}});
   route.stop_interval = stop_interval;
   route.stop = {stop[0], stop[1]};
+  if (area) {
+    const auto [x_min, y_min, x_max, y_max] = *area;
+    route.low = to_vec({x_min, y_min});
+    route.high = to_vec({x_max, y_max});
+  }
   return crowd.add_route(route);
 }
 
@@ -236,7 +243,8 @@ Raises:
     ValueError: A coordinate is not finite.
 )");
   crowd.def("add_route", &add_route, py::arg("waypoints"), py::arg("order"), py::kw_only(),
-            py::arg("stop_interval") = 0.0, py::arg("stop") = py::make_tuple(0.0, 0.0), R"(
+            py::arg("stop_interval") = 0.0, py::arg("stop") = py::make_tuple(0.0, 0.0),
+            py::arg("area") = py::none(), R"(
 Adds a route and returns its number.
 
 Args:
@@ -244,9 +252,11 @@ Args:
     order: The order in which they are visited: `loop`, `back_and_forth`, `random` or `once`.
     stop_interval: Mean time between two stops on the way [s], 0 for none.
     stop: Shortest and longest duration of a stop [s].
+    area: Area (x_min, y_min, x_max, y_max) of the places that `redraw` draws [m], world frame; None
+        for the area of the walls, which must exist then.
 
 Raises:
-    ValueError: A waypoint or the order does not exist.
+    ValueError: A waypoint or the order does not exist, or a coordinate is not finite.
 )");
   crowd.def(
       "reach",
@@ -308,6 +318,22 @@ Raises:
       "set_key",
       [](const CrowdHandle& self, std::uint64_t key) { changed_crowd(self).set_key(key); },
       py::arg("key"), "Sets the integer from which all further random numbers derive.");
+  crowd.def(
+      "redraw",
+      [](const CrowdHandle& self) {
+        const Id stranded = changed_crowd(self).redraw(self.core());
+        return stranded == 0 ? std::nullopt : std::optional(stranded);
+      },
+      R"(
+Draws new places, headings and first waypoints for the people with `Member.is_redrawn`.
+
+The people stand there and begin their routes again. The places are at some distance from walls,
+bodies and other people, and there is a way from them to the first waypoint of the route. They are a
+function of the key, the walls, and the poses of other bodies and people.
+
+Returns:
+    None, or the id of the body of a person for whom there is no free place. Nothing is changed then.
+)");
   crowd.def_property_readonly("people", &read_people,
                               "All people in the order in which they were added.");
   crowd.def_property_readonly(

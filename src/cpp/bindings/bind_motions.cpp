@@ -17,6 +17,11 @@ namespace py = pybind11;
 namespace flatland {
 namespace {
 
+double checked_share(double share) {
+  if (!(share >= 0.0 && share <= 1.0)) throw py::value_error("share must be from 0 to 1");
+  return share;
+}
+
 // Returns the motion of a vehicle with steered wheels.
 template <typename Kind>
 Kind steered_motion(double wheelbase, const PyPoint& rear_center, bool takes_twist) {
@@ -256,6 +261,26 @@ Args:
       [](const PathHandle& self, std::uint64_t key) { motion_of<PathMotion>(self).key = key; },
       py::arg("key"), "Sets the key of the random numbers, from 0 to 2^64 - 1.");
   controller.def(
+      "place",
+      [](const PathHandle& self, double share) {
+        b2Body* body = self.core().change_body(changed_controller(self).body);
+        place_on_path(self.core(), body, motion_of<PathMotion>(self), checked_share(share));
+      },
+      py::arg("share"), R"(
+Moves the body to where it is in a round of the waypoints.
+
+Has no effect in mode `once`, and on a body that is not started.
+
+Args:
+    share: Time since the initial pose as a share of the duration of a round, from 0 to 1. In mode
+        `random`, a round has as many motions as there are waypoints.
+
+Raises:
+    ValueError: The share is out of range.
+    StaleHandleError: The body was destroyed.
+    WorldLockedError: The world is stepping.
+)");
+  controller.def(
       "restart",
       [](const PathHandle& self) {
         const Id moved = changed_controller(self).body;
@@ -366,6 +391,26 @@ Raises:
       },
       py::arg("is_triggered"),
       "Sets the direction of the motion in mode `trigger`, from the next step on.");
+  controller.def(
+      "place",
+      [](const TweenHandle& self, double share) {
+        b2Body* body = self.core().change_body(changed_controller(self).body);
+        place_on_tween(self.core(), body, motion_of<TweenMotion>(self), checked_share(share));
+      },
+      py::arg("share"), R"(
+Moves the body to where it is in a period of the motion.
+
+Has no effect in the modes `once` and `trigger`.
+
+Args:
+    share: Time since the start as a share of the period, from 0 to 1; in mode `yoyo`, the period
+        contains the motion back.
+
+Raises:
+    ValueError: The share is out of range.
+    StaleHandleError: The body was destroyed.
+    WorldLockedError: The world is stepping.
+)");
   controller.def_property_readonly(
       "state",
       [](const TweenHandle& self) {

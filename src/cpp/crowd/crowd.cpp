@@ -21,10 +21,10 @@ std::uint32_t Crowd::add_waypoint(const Waypoint& waypoint) {
   if (index == waypoints_.size()) {
     waypoints_.emplace_back();
     queues_.emplace_back();
-    fields_.emplace_back();
+    way_to_.emplace_back();
   }
   waypoints_[index] = waypoint;
-  fields_[index].reset();
+  way_to_[index].reset();
   if (ways_ != nullptr) {
     const FreeGrid& grid = ways_->grid();
     const Vec size{grid.cell() * static_cast<double>(grid.columns()),
@@ -137,15 +137,15 @@ bool Crowd::is_standing(const Person& person) const {
 
 std::size_t Crowd::reach_of(World& world, std::uint32_t waypoint) {
   read_surroundings(world);
-  const FlowField* field = field_of(waypoint);
-  return field == nullptr ? 1 : field->reached();
+  const Way* way = way_of(waypoint);
+  return way == nullptr ? 1 : way->field().reached();
 }
 
 Vec Crowd::way_from(World& world, std::uint32_t waypoint, Vec place) {
   read_surroundings(world);
-  const FlowField* field = field_of(waypoint);
-  return field == nullptr ? unit(waypoints_[waypoint].place.nearest(place) - place, {1.0, 0.0})
-                          : field->direction(place, surroundings_.walls());
+  const Way* way = way_of(waypoint);
+  return way == nullptr ? unit(waypoints_[waypoint].place.nearest(place) - place, {1.0, 0.0})
+                        : way->field().direction(place, surroundings_.walls());
 }
 
 std::vector<double> Crowd::state() const {
@@ -180,10 +180,9 @@ void Crowd::read_surroundings(const World& world) {
   if (surroundings_.read(world.engine(), own_)) has_grid_ = false;
   if (has_grid_) return;
   has_grid_ = true;
-  for (auto& field : fields_) field.reset();
+  for (auto& way : way_to_) way.reset();
   const Walls& walls = surroundings_.walls();
   ways_.reset();
-  gates_ = std::make_shared<const std::vector<Gate>>();
   signals_.clear();
   if (walls.empty()) return;
   Vec low = walls.low();
@@ -194,9 +193,9 @@ void Crowd::read_surroundings(const World& world) {
   }
   const Vec margin{1.0, 1.0};  // m, to walk around a wall at the border
   ways_ = std::make_shared<Ways>(
-      FreeGrid(walls, low - margin, high + margin, settings_.cell, settings_.clearance));
-  gates_ = std::make_shared<const std::vector<Gate>>(find_gates(ways_->grid(), walls));
-  signals_.resize(gates_->size());
+      FreeGrid(walls, low - margin, high + margin, settings_.cell, settings_.clearance),
+      surroundings_.shared_walls());
+  signals_.resize(ways_->gates().size());
 }
 
 void Crowd::read_people(World& world) {
@@ -212,28 +211,20 @@ void Crowd::read_people(World& world) {
   }
 }
 
-const FlowField* Crowd::field_of(std::uint32_t waypoint) {
+const Way* Crowd::way_of(std::uint32_t waypoint) {
   if (ways_ == nullptr) return nullptr;
-  auto& field = fields_[waypoint];
-  if (field == nullptr) {
+  auto& way = way_to_[waypoint];
+  if (way == nullptr) {
     // The ways to temporary waypoints, of which there may be any number, end with them.
     const Waypoint& goal = waypoints_[waypoint];
-    field = goal.is_temporary ? std::make_shared<const FlowField>(ways_->grid(), goal.place)
-                              : ways_->to(goal.place);
+    way = goal.is_temporary ? ways_->to_temporary(goal.place) : ways_->to(goal.place);
   }
-  return field.get();
+  return way.get();
 }
 
 Vec Crowd::way_to(std::uint32_t waypoint, Vec p) {
-  const Vec straight = waypoints_[waypoint].place.nearest(p) - p;
-  const FlowField* field = field_of(waypoint);
-  if (field == nullptr) return unit(straight);
-  // Next to the place, the directions of the grid are too coarse.
-  const double close = 3.0 * ways_->grid().cell();
-  if (square(straight) < close * close && surroundings_.walls().is_clear(p, p + straight)) {
-    return unit(straight);
-  }
-  return field->direction(p, surroundings_.walls());
+  const Way* way = way_of(waypoint);
+  return way == nullptr ? unit(waypoints_[waypoint].place.nearest(p) - p) : way->from(p);
 }
 
 double Crowd::draw(std::uint64_t& draws, std::uint64_t stream, Span span) {

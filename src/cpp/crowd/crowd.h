@@ -10,8 +10,9 @@
 //   right_of_way.cpp  who passes a door first, and on which side people pass each other
 //   giving_way.cpp    who makes room for whom
 //   motion.cpp        the velocity by a model, free of contacts, and the motion of the legs
-// Parts without a state: flow_field (ways on a grid), walls and surroundings (what is avoided),
-// gates (doors), social_force and orca with half_planes (the models), gait (legs), random.
+// redraw.cpp contains the first places of people. Parts without a state: flow_field and ways (ways
+// on a grid), walls and surroundings (what is avoided), gates (doors), social_force and orca with
+// half_planes (the models), gait (legs), random.
 #pragma once
 
 #include <cstddef>
@@ -20,11 +21,11 @@
 #include <unordered_set>
 #include <vector>
 
-#include "crowd/flow_field.h"
 #include "crowd/gates.h"
 #include "crowd/half_planes.h"
 #include "crowd/people.h"
 #include "crowd/surroundings.h"
+#include "crowd/ways.h"
 #include "world/job_place.h"
 
 namespace flatland {
@@ -51,6 +52,10 @@ class Crowd {
   std::uint32_t add_route(const Route& route);
   // Adds people who walk together; the list must not be empty.
   void add_party(std::uint32_t route, std::uint32_t first_leg, const std::vector<Person>& people);
+  // Draws new places, headings and first waypoints for all people whose places are drawn, with the
+  // current key; see redraw.cpp. Returns the body of a person for whom there is no free place, and
+  // changes nothing in this case; returns 0 on success.
+  Id redraw(World& world);
   // Does nothing if the body is not that of a person. A party ends with its last member.
   void remove_person(Id body);
   void set_key(std::uint64_t key) { settings_.key = key; }
@@ -88,9 +93,21 @@ class Crowd {
   // Null if the person was removed.
   const Person* numbered(std::uint32_t number) const;
   bool is_queued(const Person& person) const;
-  const FlowField* field_of(std::uint32_t waypoint);
+  // Null in a world without walls.
+  const Way* way_of(std::uint32_t waypoint);
   Vec way_to(std::uint32_t waypoint, Vec p);
   double draw(std::uint64_t& draws, std::uint64_t stream, Span span);
+
+  // redraw.cpp: the first places of people.
+  struct Spot {
+    Vec position;
+    double radius = 0.0;
+  };
+
+  bool is_free(const Spot& spot, const std::vector<Spot>& taken) const;
+  bool draw_spot(std::size_t i, const std::vector<Spot>& taken, Spot& spot);
+  void arrange(const std::vector<std::size_t>& people, std::vector<Spot>& spots) const;
+  void begin_again(World& world, std::size_t i, Vec position);
 
   // routes.cpp: where a person wants to walk.
   Choice choose(Person& person, std::int64_t step, double dt, double period);
@@ -127,6 +144,9 @@ class Crowd {
 
   // motion.cpp: how a person moves.
   void find_neighbours();
+  void find_walls(double period);
+  // Appends the points of walls within a range of person i, at most that of `find_walls`.
+  void add_walls(std::size_t i, double range, std::vector<NearPoint>& found) const;
   Vec by_social_force(std::size_t i, const Choice& choice, Vec preferred, double period);
   Vec by_orca(std::size_t i, Vec preferred, double period);
   Vec without_contact(std::size_t i, Vec velocity, double period);
@@ -144,18 +164,19 @@ class Crowd {
   std::uint32_t next_party_ = 0;                    // number of the next party
 
   Surroundings surroundings_;
-  std::unordered_set<Id> own_;  // bodies and legs of all people
-  std::shared_ptr<Ways> ways_;  // null in a world without walls
-  bool has_grid_ = false;       // whether `ways_`, `fields_` and `gates_` match the walls
-  std::vector<std::shared_ptr<const FlowField>> fields_;  // by waypoint, null if not needed yet
-  std::shared_ptr<const std::vector<Gate>> gates_ = std::make_shared<const std::vector<Gate>>();
-  std::vector<Signal> signals_;  // by gate
+  std::unordered_set<Id> own_;                      // bodies and legs of all people
+  std::shared_ptr<Ways> ways_;                      // null in a world without walls
+  bool has_grid_ = false;                           // whether `ways_` and `way_to_` match the walls
+  std::vector<std::shared_ptr<const Way>> way_to_;  // by waypoint, null if not needed yet
+  std::vector<Signal> signals_;                     // by gate
 
   // The members below are valid within one update.
   std::vector<std::uint32_t> guests_;  // number of people who stand at each waypoint
   std::vector<std::uint32_t> neighbours_, neighbour_starts_;
   std::vector<Vec> chosen_;
-  std::size_t decided_ = 0;  // number of people whose velocity is chosen
+  std::size_t decided_ = 0;            // number of people whose velocity is chosen
+  std::vector<NearPoint> near_walls_;  // within reach of each person
+  std::vector<std::uint32_t> near_wall_starts_;
   std::vector<NearPoint> near_;
   std::vector<HalfPlane> planes_;
 };

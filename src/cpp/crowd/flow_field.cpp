@@ -78,6 +78,13 @@ class Front {
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> front_;
 };
 
+// Returns the greatest integer that is not greater than a number; std::floor is a call of a
+// library.
+std::int64_t floored(double number) {
+  const auto truncated = static_cast<std::int64_t>(number);
+  return static_cast<double>(truncated) > number ? truncated - 1 : truncated;
+}
+
 // Returns the derivative of the arrival time on the side from which the front arrived.
 double upwind(float before, float here, float after) {
   if (std::min(before, after) >= here) return 0.0;
@@ -146,8 +153,8 @@ Vec FlowField::direction(Vec p, const Walls& walls) const {
         y < static_cast<double>(rows_) + kMargin)) {
     return {};
   }
-  const auto column = static_cast<std::int64_t>(std::floor(x));
-  const auto row = static_cast<std::int64_t>(std::floor(y));
+  const std::int64_t column = floored(x);
+  const std::int64_t row = floored(y);
   const auto at = [&](std::int64_t c, std::int64_t r) {
     return c < 0 || r < 0 || c >= columns_ || r >= rows_ ? Direction{} : directions_[index(c, r)];
   };
@@ -177,18 +184,6 @@ Vec FlowField::direction(Vec p, const Walls& walls) const {
     }
   }
   return unit(target);
-}
-
-std::shared_ptr<const FlowField> Ways::to(const Place& place) {
-  Way* way = nullptr;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    // The nodes of a map remain where they are.
-    way = &ways_[{place.low.x, place.low.y, place.high.x, place.high.y, place.radius}];
-  }
-  std::call_once(way->is_computed,
-                 [&] { way->field = std::make_shared<const FlowField>(grid_, place); });
-  return way->field;
 }
 
 }  // namespace flatland::crowd

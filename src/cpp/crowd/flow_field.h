@@ -1,13 +1,8 @@
 // The ways to a place: the direction of the fastest way from each cell of a grid.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <map>
-#include <memory>
-#include <mutex>
-#include <utility>
 #include <vector>
 
 #include "crowd/walls.h"
@@ -73,28 +68,6 @@ class FlowField {
   std::int64_t columns_, rows_;
   std::vector<Direction> directions_;
   std::size_t reached_ = 0;
-};
-
-// The ways on a grid to places that people walk to again and again. Each way is computed when it is
-// first needed. Copies of a crowd share the object, also if they advance in different threads.
-class Ways {
- public:
-  explicit Ways(FreeGrid grid) : grid_(std::move(grid)) {}
-
-  const FreeGrid& grid() const { return grid_; }
-  std::shared_ptr<const FlowField> to(const Place& place);
-
- private:
-  using Key = std::array<double, 5>;
-
-  struct Way {
-    std::once_flag is_computed;
-    std::shared_ptr<const FlowField> field;
-  };
-
-  const FreeGrid grid_;
-  std::mutex mutex_;
-  std::map<Key, Way> ways_;  // by the numbers of the place
 };
 
 }  // namespace flatland::crowd

@@ -73,6 +73,23 @@ void Crowd::find_neighbours() {
   }
 }
 
+void Crowd::find_walls(double period) {
+  near_walls_.clear();
+  near_wall_starts_.clear();
+  for (const Person& person : people_) {
+    near_wall_starts_.push_back(static_cast<std::uint32_t>(near_walls_.size()));
+    const double reach = std::max(kWallSight, kSkin + most_speed(person) * period);
+    surroundings_.walls().find_near(person.position, person.radius + reach, near_walls_);
+  }
+  near_wall_starts_.push_back(static_cast<std::uint32_t>(near_walls_.size()));
+}
+
+void Crowd::add_walls(std::size_t i, double range, std::vector<NearPoint>& found) const {
+  for (std::uint32_t k = near_wall_starts_[i]; k < near_wall_starts_[i + 1]; ++k) {
+    if (near_walls_[k].distance <= range) found.push_back(near_walls_[k]);
+  }
+}
+
 Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, double period) {
   const Person& person = people_[i];
   const SocialForces& forces = settings_.forces;
@@ -104,7 +121,7 @@ Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, d
     sum += view_weight(forces, choice.direction, push) * push;
   }
   near_.clear();
-  walls.find_near(person.position, person.radius + kWallSight, near_);
+  add_walls(i, person.radius + kWallSight, near_);
   keep_sides(person.position, near_);
   for (const NearPoint& wall : near_) {
     sum += wall_repulsion(forces, person.position - wall.point, person.radius);
@@ -128,7 +145,7 @@ Vec Crowd::by_orca(std::size_t i, Vec preferred, double period) {
   constexpr double kMargin = 0.05;  // additional gap [m]
   planes_.clear();
   near_.clear();
-  surroundings_.walls().find_near(person.position, person.radius + kWallSight, near_);
+  add_walls(i, person.radius + kWallSight, near_);
   keep_sides(person.position, near_);
   for (const NearPoint& wall : near_) {
     planes_.push_back(keep_off(unit(person.position - wall.point, {1.0, 0.0}),
@@ -163,7 +180,7 @@ Vec Crowd::without_contact(std::size_t i, Vec velocity, double period) {
   planes_.clear();
   near_.clear();
   const double fastest = most_speed(person);
-  surroundings_.walls().find_near(person.position, person.radius + kSkin + fastest * period, near_);
+  add_walls(i, person.radius + kSkin + fastest * period, near_);
   for (const NearPoint& wall : near_) {
     const Vec away = unit(person.position - wall.point, {1.0, 0.0});
     planes_.push_back({away, closing_offset(wall.distance - person.radius, period)});
@@ -206,6 +223,7 @@ void Crowd::update(World& world, std::int64_t step, double dt) {
   read_people(world);
   read_surroundings(world);
   find_neighbours();
+  find_walls(period);
   count_guests();
   std::vector<Choice> choices(people_.size());
   std::vector<Vec> wanted(people_.size());

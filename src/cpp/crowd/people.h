@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "crowd/flow_field.h"
@@ -35,6 +36,9 @@ struct Route {
 
   std::vector<std::uint32_t> waypoints;  // not empty
   Order order = Order::kLoop;
+  // The area of the first places of people.
+  Vec low{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  Vec high{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   double stop_interval = 0.0;  // mean time between two stops on the way [s], 0 for none
   Span stop;                   // duration of a stop
 };
@@ -62,6 +66,7 @@ struct Person {
   double speed = 1.34;      // preferred speed [m/s]
   bool is_aware = true;     // whether the person avoids robots, that is, dynamic bodies
   bool is_stopped = false;
+  bool is_redrawn = false;          // whether `redraw` draws another place
   std::uint32_t sent_to = kNone;    // waypoint that replaces the route
   std::int64_t stop_until = 0;      // number of a step, 0 if the person does not stop on the way
   std::uint64_t draws = 0;          // count of random numbers drawn

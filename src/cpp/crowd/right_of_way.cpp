@@ -30,24 +30,24 @@ constexpr double kMostTurn = 0.5;  // tangent of the greatest angle by which peo
 
 bool Crowd::approaches(std::size_t i, const Choice& choice, std::size_t gate, Approach& approach) {
   const Person& person = people_[i];
-  const Gate& g = (*gates_)[gate];
+  const Gate& g = ways_->gates()[gate];
   const Vec offset = person.position - g.center;
-  if (square(offset) > kApproach * kApproach) return false;
-  // The way is taken at the center: next to a door post, the way may lead in any direction.
-  const double cosine = dot(way_to(target_of(person), g.center), g.axis);
-  if (std::fabs(cosine) < kThrough) return false;
   const double along = dot(offset, g.axis);
   const bool is_inside = std::fabs(along) < g.half_depth + kThreshold &&
                          std::fabs(cross(g.axis, offset)) < g.half_width;
+  const bool is_ahead = dot(choice.direction, -offset) > kAhead * length(offset);
+  if (!is_inside && !is_ahead) return false;
+  // The way is taken at the center: next to a door post, the way may lead in any direction.
+  const double cosine = dot(way_of(target_of(person))->from_gate(gate), g.axis);
+  if (std::fabs(cosine) < kThrough) return false;
   approach = {i, gate, cosine > 0.0 ? 1 : 0, is_inside};
   if (is_inside) return true;
-  return cosine * along < 0.0 && dot(choice.direction, -offset) > kAhead * length(offset) &&
-         surroundings_.walls().is_clear(person.position, g.center);
+  return cosine * along < 0.0 && surroundings_.walls().is_clear(person.position, g.center);
 }
 
 Crowd::Choice Crowd::step_aside(const Person& person, const Choice& choice,
                                 const Approach& approach) const {
-  const Gate& gate = (*gates_)[approach.gate];
+  const Gate& gate = ways_->gates()[approach.gate];
   const Vec ahead = approach.direction == 1 ? gate.axis : -gate.axis;
   const Vec offset = person.position - gate.center;
   const double distance = -dot(offset, ahead) - gate.half_depth;
@@ -62,7 +62,8 @@ Crowd::Choice Crowd::step_aside(const Person& person, const Choice& choice,
 }
 
 void Crowd::keep_doors_clear(std::vector<Choice>& choices, std::int64_t step, double dt) {
-  const std::vector<Gate>& gates = *gates_;
+  if (ways_ == nullptr || ways_->gates().empty()) return;
+  const std::vector<Gate>& gates = ways_->gates();
   std::vector<Demand> demands(gates.size());
   for (Demand& demand : demands) {
     for (double& nearest : demand.nearest) nearest = std::numeric_limits<double>::infinity();
@@ -75,6 +76,7 @@ void Crowd::keep_doors_clear(std::vector<Choice>& choices, std::int64_t step, do
         std::lower_bound(gates.begin(), gates.end(), x - kApproach,
                          [](const Gate& gate, double least) { return gate.center.x < least; });
     for (auto gate = first; gate != gates.end() && gate->center.x <= x + kApproach; ++gate) {
+      if (square(people_[i].position - gate->center) > kApproach * kApproach) continue;
       Approach approach;
       const auto index = static_cast<std::size_t>(gate - gates.begin());
       if (!approaches(i, choices[i], index, approach)) continue;

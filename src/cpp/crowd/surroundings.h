@@ -41,6 +41,7 @@ class Surroundings {
   bool read(const b2World& engine, const std::unordered_set<Id>& own);
 
   const Walls& walls() const { return *walls_; }
+  std::shared_ptr<const Walls> shared_walls() const { return walls_; }
   const std::vector<Obstacle>& obstacles() const { return obstacles_; }
 
  private:

@@ -66,17 +66,20 @@ Walls::Walls(std::vector<Segment> segments) : segments_(std::move(segments)) {
   for (std::size_t cell = 1; cell < starts_.size(); ++cell) starts_[cell] += starts_[cell - 1];
   members_.resize(starts_.back());
   std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
-  each_cell([&](std::size_t cell, std::uint32_t i) { members_[next[cell]++] = i; });
+  each_cell([&](std::size_t cell, std::uint32_t i) {
+    const auto column = static_cast<std::int64_t>(cell) % columns_;
+    members_[next[cell]++] = {segments_[i], column};
+  });
 }
 
 std::int64_t Walls::column_of(double x) const {
-  const double column = std::floor((x - low_.x) / cell_);
+  const double column = (x - low_.x) / cell_;
   return static_cast<std::int64_t>(
       std::min(std::max(column, 0.0), static_cast<double>(columns_ - 1)));
 }
 
 std::int64_t Walls::row_of(double y) const {
-  const double row = std::floor((y - low_.y) / cell_);
+  const double row = (y - low_.y) / cell_;
   return static_cast<std::int64_t>(std::min(std::max(row, 0.0), static_cast<double>(rows_ - 1)));
 }
 
@@ -91,64 +94,84 @@ void Walls::visit_cells(Vec low, Vec high, Visit&& visit) const {
   }
 }
 
+template <typename Visit>
+void Walls::visit_members(std::int64_t row, std::int64_t first, std::int64_t last,
+                          Visit&& visit) const {
+  const std::uint32_t end = starts_[static_cast<std::size_t>(row * columns_ + last) + 1];
+  for (std::uint32_t k = starts_[static_cast<std::size_t>(row * columns_ + first)]; k < end; ++k) {
+    visit(members_[k]);
+  }
+}
+
 void Walls::find_near(Vec p, double range, std::vector<NearPoint>& found) const {
   if (empty()) return;
-  const Vec margin{range, range};
-  visit_cells(p - margin, p + margin, [&](std::int64_t column, std::int64_t row) {
-    const auto cell = static_cast<std::size_t>(row * columns_ + column);
-    for (std::uint32_t k = starts_[cell]; k < starts_[cell + 1]; ++k) {
-      const Vec point = nearest_on(segments_[members_[k]], p);
+  const double most = range * range * (1.0 + 1e-9);  // including a rounding error
+  const std::int64_t first_column = column_of(p.x - range);
+  const std::int64_t last_column = column_of(p.x + range);
+  const std::int64_t last_row = row_of(p.y + range);
+  for (std::int64_t row = row_of(p.y - range); row <= last_row; ++row) {
+    visit_members(row, first_column, last_column, [&](const Member& member) {
+      const Vec point = nearest_on(member.segment, p);
+      if (square(point - p) > most) return;
       // A segment can be in several cells, and is found in the cell of the nearest point.
-      if (column_of(point.x) != column || row_of(point.y) != row) continue;
+      if (column_of(point.x) != member.column || row_of(point.y) != row) return;
       const double distance = length(point - p);
       if (distance <= range) found.push_back({point, distance});
-    }
-  });
+    });
+  }
 }
 
 double Walls::distance(Vec p, double range) const {
   if (empty()) return range;
   double nearest = range * range;
-  const Vec margin{range, range};
-  visit_cells(p - margin, p + margin, [&](std::int64_t column, std::int64_t row) {
-    const auto cell = static_cast<std::size_t>(row * columns_ + column);
-    for (std::uint32_t k = starts_[cell]; k < starts_[cell + 1]; ++k) {
-      nearest = std::min(nearest, square(nearest_on(segments_[members_[k]], p) - p));
-    }
-  });
+  const std::int64_t first_column = column_of(p.x - range);
+  const std::int64_t last_column = column_of(p.x + range);
+  const std::int64_t last_row = row_of(p.y + range);
+  for (std::int64_t row = row_of(p.y - range); row <= last_row; ++row) {
+    visit_members(row, first_column, last_column, [&](const Member& member) {
+      nearest = std::min(nearest, square(nearest_on(member.segment, p) - p));
+    });
+  }
   return std::sqrt(nearest);
 }
 
 bool Walls::is_clear(Vec from, Vec to) const {
   if (empty()) return true;
-  bool is_clear = true;
-  visit_cells({std::min(from.x, to.x), std::min(from.y, to.y)},
-              {std::max(from.x, to.x), std::max(from.y, to.y)},
-              [&](std::int64_t column, std::int64_t row) {
-                const auto cell = static_cast<std::size_t>(row * columns_ + column);
-                for (std::uint32_t k = starts_[cell]; is_clear && k < starts_[cell + 1]; ++k) {
-                  is_clear = !crosses(segments_[members_[k]], from, to);
-                }
-              });
-  return is_clear;
+  constexpr double kRounding = 1e-6;  // m
+  const auto [low, high] = from.y < to.y ? std::pair(from, to) : std::pair(to, from);
+  const double slope = (high.x - low.x) / std::max(high.y - low.y, kRounding);
+  const std::int64_t last_row = row_of(high.y);
+  for (std::int64_t row = row_of(low.y); row <= last_row; ++row) {
+    // The part of the line in a row of cells. The first and the last row have no outer limit.
+    const double bottom = low_.y + static_cast<double>(row) * cell_;
+    double begin = low.x;
+    double end = high.x;
+    if (row > 0 && bottom > low.y) begin += slope * (bottom - low.y);
+    if (row + 1 < rows_ && bottom + cell_ < high.y) end -= slope * (high.y - bottom - cell_);
+    const std::int64_t last_column = column_of(std::max(begin, end) + kRounding);
+    bool is_clear = true;
+    visit_members(
+        row, column_of(std::min(begin, end) - kRounding), last_column,
+        [&](const Member& member) { is_clear = is_clear && !crosses(member.segment, from, to); });
+    if (!is_clear) return false;
+  }
+  return true;
 }
 
 void keep_sides(Vec p, std::vector<NearPoint>& points) {
-  std::sort(points.begin(), points.end(), [](const NearPoint& a, const NearPoint& b) {
-    return std::tie(a.distance, a.point.x, a.point.y) < std::tie(b.distance, b.point.x, b.point.y);
-  });
   constexpr double kTolerance = 1e-6;  // greatest cosine of a right angle, because of rounding
-  std::size_t kept = 0;
-  for (const NearPoint& each : points) {
-    const Vec direction = unit(each.point - p);
-    const bool is_new =
-        std::all_of(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(kept),
-                    [&](const NearPoint& other) {
-                      return dot(direction, unit(other.point - p)) <= kTolerance;
-                    });
-    if (is_new) points[kept++] = each;
+  const auto is_nearer = [](const NearPoint& a, const NearPoint& b) {
+    return std::tie(a.distance, a.point.x, a.point.y) < std::tie(b.distance, b.point.x, b.point.y);
+  };
+  for (auto rest = points.begin(); rest != points.end();) {
+    std::iter_swap(rest, std::min_element(rest, points.end(), is_nearer));
+    const Vec direction = unit(rest->point - p);
+    ++rest;
+    const auto is_same_side = [&](const NearPoint& each) {
+      return !(dot(unit(each.point - p), direction) <= kTolerance);
+    };
+    points.erase(std::remove_if(rest, points.end(), is_same_side), points.end());
   }
-  points.resize(kept);
 }
 
 }  // namespace flatland::crowd

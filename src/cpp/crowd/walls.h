@@ -42,6 +42,12 @@ class Walls {
   bool is_clear(Vec from, Vec to) const;
 
  private:
+  // A segment in a cell. The members of all cells of a row are contiguous.
+  struct Member {
+    Segment segment;
+    std::int64_t column = 0;
+  };
+
   template <typename Visit>
   void visit_cells(Vec low, Vec high, Visit&& visit) const;
   std::int64_t column_of(double x) const;
@@ -51,8 +57,12 @@ class Walls {
   Vec low_, high_;
   double cell_ = 1.0;
   std::int64_t columns_ = 0, rows_ = 0;
-  std::vector<std::uint32_t> starts_;   // index of the first entry of each cell in `members_`
-  std::vector<std::uint32_t> members_;  // indices of the segments in each cell, cell by cell
+  // Visits the members of the cells of a row, from one column to another one.
+  template <typename Visit>
+  void visit_members(std::int64_t row, std::int64_t first, std::int64_t last, Visit&& visit) const;
+
+  std::vector<std::uint32_t> starts_;  // index of the first entry of each cell in `members_`
+  std::vector<Member> members_;        // cell by cell
 };
 
 // Reduces the nearest points of segments to one point for each side on which there is a wall: keeps

@@ -7,6 +7,7 @@
 #include <cstddef>
 
 #include "world/bodies.h"
+#include "world/joined_bodies.h"
 #include "world/joints.h"
 
 namespace flatland {
@@ -214,10 +215,14 @@ void hold_motion(World& world, b2Body* body, const TweenMotion& motion) {
   if (motion.is_dynamic) set_velocity(body, {0.0, 0.0, 0.0});
 }
 
-void advance_motion(World& world, b2Body* body, TweenMotion& motion, double dt) {
-  advance_progress(motion, lesser(dt / motion.duration, 1.0));
+void set_pose_of_progress(TweenMotion& motion) {
   const double eased = motion.easing(static_cast<double>(motion.progress));
   for (std::size_t i = 0; i < 3; ++i) motion.pose[i] = motion.start[i] + motion.delta[i] * eased;
+}
+
+void advance_motion(World& world, b2Body* body, TweenMotion& motion, double dt) {
+  advance_progress(motion, lesser(dt / motion.duration, 1.0));
+  set_pose_of_progress(motion);
   hold_motion(world, body, motion);
 }
 
@@ -269,6 +274,16 @@ void hold(World& world, b2Body* body, Motion& motion) {
   } else if (auto* wheels = std::get_if<RollingWheels>(&motion)) {
     measure_wheels(world, *wheels);
   }
+}
+
+void place_on_tween(World& world, b2Body* body, TweenMotion& motion, double share) {
+  using Mode = TweenMotion::Mode;
+  if (motion.mode != Mode::kYoyo && motion.mode != Mode::kLoop) return;
+  const double progress = motion.mode == Mode::kYoyo ? 2.0 * share : share;
+  motion.is_forward = progress < 1.0;
+  set_progress(motion, motion.is_forward ? progress : lesser(2.0 - progress, 1.0));
+  set_pose_of_progress(motion);
+  place_with_joined(world, body, motion.pose);
 }
 
 bool has_hold(const Motion& motion) {

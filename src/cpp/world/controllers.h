@@ -106,6 +106,9 @@ void advance(World& world, b2Body* body, Motion& motion, double dt);
 // Reverts the effect of the physics step on a body whose motion is prescribed, or measures it.
 // Idempotent. Throws as `advance`.
 void hold(World& world, b2Body* body, Motion& motion);
+// Moves the body to where it is in a period of the motion. Has no effect in the modes kOnce and
+// kTrigger. `share` is the time since the start as a share of the period, from 0 to 1.
+void place_on_tween(World& world, b2Body* body, TweenMotion& motion, double share);
 // Returns whether `hold` has an effect.
 bool has_hold(const Motion& motion);
 

@@ -15,32 +15,15 @@
 namespace flatland {
 namespace {
 
+using free_motion::FreeState;
+using free_motion::kMostFixtures;
+using free_motion::Move;
+using free_motion::MovedBox;
 using members::get;
 
-// Bodies with more fixtures or contacts than this are left to Box2D.
-constexpr std::size_t kMostFixtures = 8;
 // A body is clear of a fixture if their boxes are at least this far apart [m]. Box2D finds impacts
 // at distances of up to a quarter of its slop.
 constexpr float kClearance = b2_linearSlop;
-
-struct FreeState {
-  b2Vec2 center;
-  float angle = 0.0F;
-  b2Vec2 velocity;
-  float omega = 0.0F;
-  float sleep_time = 0.0F;
-};
-
-// A fixture that moves, and its new box.
-struct MovedBox {
-  b2FixtureProxy* proxy;
-  b2AABB box;
-};
-
-struct MovedBoxes {
-  std::array<MovedBox, kMostFixtures> boxes;
-  std::size_t count = 0;
-};
 
 bool is_moving(const b2Body& body) {
   return body.GetType() != b2_staticBody && body.IsAwake() && body.IsEnabled();
@@ -89,36 +72,44 @@ bool stays_awake(b2Body& body, FreeState& state, float dt, int position_iteratio
   return state.sleep_time < b2_timeToSleep || position_iterations < 1;
 }
 
+// Returns the box of a fixture in the broad phase after a move, as in b2DynamicTree::MoveProxy.
+b2AABB fat_box(const b2AABB& box, b2Vec2 displacement) {
+  const b2Vec2 margin(b2_aabbExtension, b2_aabbExtension);
+  b2AABB moved{box.lowerBound - margin, box.upperBound + margin};
+  const b2Vec2 ahead = b2_aabbMultiplier * displacement;
+  (ahead.x < 0.0F ? moved.lowerBound : moved.upperBound).x += ahead.x;
+  (ahead.y < 0.0F ? moved.lowerBound : moved.upperBound).y += ahead.y;
+  return moved;
+}
+
 // Returns whether the broad phase keeps the box of a fixture, as in b2DynamicTree::MoveProxy.
 bool keeps_box(const b2AABB& kept, const b2AABB& box, b2Vec2 displacement) {
   if (!kept.Contains(box)) return false;
   const b2Vec2 margin(b2_aabbExtension, b2_aabbExtension);
-  b2AABB largest{box.lowerBound - margin, box.upperBound + margin};
-  const b2Vec2 ahead = b2_aabbMultiplier * displacement;
-  (ahead.x < 0.0F ? largest.lowerBound : largest.upperBound).x += ahead.x;
-  (ahead.y < 0.0F ? largest.lowerBound : largest.upperBound).y += ahead.y;
+  b2AABB largest = fat_box(box, displacement);
   largest.lowerBound = largest.lowerBound - 4.0F * margin;
   largest.upperBound = largest.upperBound + 4.0F * margin;
   return largest.Contains(kept);
 }
 
-// Computes the boxes that the fixtures sweep. Returns whether the broad phase keeps all of its
-// boxes.
+// Computes the boxes that the fixtures sweep. Returns false if there are too many.
 bool sweep_boxes(b2Body& body, const b2BroadPhase& broad_phase, const b2Transform& from,
-                 const b2Transform& to, MovedBoxes& moved) {
-  const auto& tree = get<members::BroadPhaseTree>(const_cast<b2BroadPhase&>(broad_phase));
+                 Move& move) {
+  const auto& tree = get<members::BroadPhaseTree>(broad_phase);
   for (b2Fixture* f = body.GetFixtureList(); f != nullptr; f = f->GetNext()) {
-    if (moved.count == kMostFixtures || get<members::FixtureProxyCount>(*f) != 1) return false;
+    if (move.count == kMostFixtures || get<members::FixtureProxyCount>(*f) != 1) return false;
     b2FixtureProxy* proxy = get<members::FixtureProxies>(*f);
     b2AABB before;
     b2AABB after;
     f->GetShape()->ComputeAABB(&before, from, proxy->childIndex);
-    f->GetShape()->ComputeAABB(&after, to, proxy->childIndex);
-    MovedBox& each = moved.boxes[moved.count++];
+    f->GetShape()->ComputeAABB(&after, move.to, proxy->childIndex);
+    MovedBox& each = move.boxes[move.count++];
     each.proxy = proxy;
     each.box.Combine(before, after);
-    const b2Vec2 displacement = after.GetCenter() - before.GetCenter();
-    if (!keeps_box(tree.GetFatAABB(proxy->proxyId), each.box, displacement)) return false;
+    each.displacement = after.GetCenter() - before.GetCenter();
+    if (!keeps_box(tree.GetFatAABB(proxy->proxyId), each.box, each.displacement)) {
+      move.are_kept = false;
+    }
   }
   return true;
 }
@@ -133,8 +124,8 @@ float bulge(const b2AABB& box, b2Vec2 center, float rotation) {
 
 // Returns whether a fixture stays clear of the fixtures in its contacts during a step, so that the
 // step changes no contact.
-bool stays_clear(b2Body& body, const FreeState& state, const b2BroadPhase& broad_phase,
-                 const MovedBoxes& moved) {
+bool stays_clear(b2Body& body, const b2BroadPhase& broad_phase, const Move& move) {
+  const FreeState& state = move.state;
   for (b2ContactEdge* edge = body.GetContactList(); edge != nullptr; edge = edge->next) {
     b2Contact& contact = *edge->contact;
     const bool is_filtered =
@@ -148,7 +139,7 @@ bool stays_clear(b2Body& body, const FreeState& state, const b2BroadPhase& broad
     const b2FixtureProxy* proxy = get<members::FixtureProxies>(*own);
     const b2FixtureProxy* other_proxy = get<members::FixtureProxies>(*other);
     if (!broad_phase.TestOverlap(proxy->proxyId, other_proxy->proxyId)) return false;
-    const auto* found = std::find_if(moved.boxes.begin(), moved.boxes.begin() + moved.count,
+    const auto* found = std::find_if(move.boxes.begin(), move.boxes.begin() + move.count,
                                      [&](const MovedBox& each) { return each.proxy == proxy; });
     const b2Sweep& sweep = get<members::BodySweep>(body);
     const float rotation = state.angle - sweep.a;
@@ -172,56 +163,102 @@ b2Transform transform_of(b2Rot rotation, b2Vec2 center, b2Vec2 local_center) {
   return {center - b2Mul(rotation, local_center), rotation};
 }
 
-// Moves a body if it is free. Returns whether it is.
-bool move(b2Body& body, const b2BroadPhase& broad_phase, float dt, int position_iterations) {
+// Computes the move of a body. Returns false if the body is not free.
+bool plan(b2Body& body, const b2BroadPhase& broad_phase, float dt, int position_iterations,
+          Move& move) {
   if (body.GetJointList() != nullptr) return false;
-  FreeState state = integrate(body, dt);
-  if (!stays_awake(body, state, dt, position_iterations)) return false;
-  b2Sweep& sweep = get<members::BodySweep>(body);
-  b2Transform& transform = get<members::BodyTransform>(body);
+  move.body = &body;
+  move.state = integrate(body, dt);
+  if (!stays_awake(body, move.state, dt, position_iterations)) return false;
+  const b2Sweep& sweep = get<members::BodySweep>(body);
   // The rotation of the transform is always that of the angle of the sweep.
-  const b2Transform from = transform_of(transform.q, sweep.c, sweep.localCenter);
-  const b2Transform to = transform_of(b2Rot(state.angle), state.center, sweep.localCenter);
-  MovedBoxes moved;
-  if (!sweep_boxes(body, broad_phase, from, to, moved) ||
-      !stays_clear(body, state, broad_phase, moved)) {
-    return false;
+  const b2Rot rotation = body.GetTransform().q;
+  const b2Transform from = transform_of(rotation, sweep.c, sweep.localCenter);
+  move.to = transform_of(b2Rot(move.state.angle), move.state.center, sweep.localCenter);
+  return sweep_boxes(body, broad_phase, from, move) &&
+         (move.are_kept || body.GetType() == b2_kinematicBody) &&
+         stays_clear(body, broad_phase, move);
+}
+
+// Returns whether the new boxes of a move overlap those of bodies in the broad phase.
+bool meets(const Move& move, const std::vector<b2Body*>& bodies, const b2BroadPhase& broad_phase) {
+  const auto& tree = get<members::BroadPhaseTree>(broad_phase);
+  const auto overlaps = [&](b2Fixture& fixture, const b2AABB& box) {
+    const b2FixtureProxy* proxies = get<members::FixtureProxies>(fixture);
+    return std::any_of(proxies, proxies + get<members::FixtureProxyCount>(fixture),
+                       [&](const b2FixtureProxy& proxy) {
+                         return b2TestOverlap(box, tree.GetFatAABB(proxy.proxyId));
+                       });
+  };
+  for (std::size_t i = 0; i < move.count; ++i) {
+    const b2AABB box = fat_box(move.boxes[i].box, move.boxes[i].displacement);
+    for (b2Body* body : bodies) {
+      for (b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) {
+        if (overlaps(*f, box)) return true;
+      }
+    }
   }
+  return false;
+}
+
+void carry_out(const Move& move, b2BroadPhase& broad_phase) {
+  b2Body& body = *move.body;
+  b2Sweep& sweep = get<members::BodySweep>(body);
   sweep.c0 = sweep.c;
   sweep.a0 = sweep.a;
   sweep.alpha0 = 0.0F;
-  sweep.c = state.center;
-  sweep.a = state.angle;
-  transform = to;
-  get<members::BodyVelocity>(body) = state.velocity;
-  get<members::BodyOmega>(body) = state.omega;
-  get<members::BodySleepTime>(body) = state.sleep_time;
+  sweep.c = move.state.center;
+  sweep.a = move.state.angle;
+  get<members::BodyTransform>(body) = move.to;
+  get<members::BodyVelocity>(body) = move.state.velocity;
+  get<members::BodyOmega>(body) = move.state.omega;
+  get<members::BodySleepTime>(body) = move.state.sleep_time;
   get<members::BodyForce>(body).SetZero();
   get<members::BodyTorque>(body) = 0.0F;
-  for (std::size_t i = 0; i < moved.count; ++i) moved.boxes[i].proxy->aabb = moved.boxes[i].box;
-  return true;
+  auto& tree = get<members::BroadPhaseTree>(broad_phase);
+  for (std::size_t i = 0; i < move.count; ++i) {
+    const MovedBox& each = move.boxes[i];
+    each.proxy->aabb = each.box;
+    if (move.are_kept) continue;
+    tree.MoveProxy(each.proxy->proxyId, each.box, each.displacement);
+    // Box2D clears the mark after its search for new contacts.
+    tree.ClearMoved(each.proxy->proxyId);
+  }
 }
 
 }  // namespace
 
 bool FreeMotion::begin(b2World& world, float dt, int position_iterations) {
   moved_.clear();
-  const b2BroadPhase& broad_phase = world.GetContactManager().m_broadPhase;
+  leaving_.clear();
+  dynamic_.clear();
+  auto& broad_phase = const_cast<b2BroadPhase&>(world.GetContactManager().m_broadPhase);
   // The next step searches for new contacts of bodies that were created or moved from outside.
   if (get<members::WorldNewContacts>(world) || !get<members::WorldStepComplete>(world) ||
-      get<members::BroadPhaseMovedCount>(const_cast<b2BroadPhase&>(broad_phase)) > 0) {
+      get<members::BroadPhaseMovedCount>(broad_phase) > 0) {
     return false;
   }
   bool is_all = true;
   for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
+    if (body->GetType() == b2_dynamicBody) dynamic_.push_back(body);
     if (!is_moving(*body)) continue;
-    if (move(*body, broad_phase, dt, position_iterations)) {
+    Move move;
+    if (!plan(*body, broad_phase, dt, position_iterations, move)) {
+      is_all = false;
+    } else if (move.are_kept) {
+      carry_out(move, broad_phase);
       moved_.push_back(body);
     } else {
-      is_all = false;
+      leaving_.push_back(move);
     }
   }
+  // The broad phase depends on the order in which boxes move. It is that of Box2D if all bodies are
+  // free, since those above have moved no box.
+  is_all = is_all && std::none_of(leaving_.begin(), leaving_.end(), [&](const Move& move) {
+             return meets(move, dynamic_, broad_phase);
+           });
   if (is_all) {
+    for (const Move& move : leaving_) carry_out(move, broad_phase);
     get<members::WorldLastRate>(world) = 1.0F / dt;
     return true;
   }

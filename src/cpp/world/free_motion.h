@@ -4,15 +4,53 @@
 // fixtures whose boxes are near. For such a body, b2Island::Solve only integrates its forces and
 // velocity, and the handling of impacts finds none. The same operations in the same order, without
 // the lists of the solver, give the same numbers bit by bit.
+//
+// A body that leaves its boxes in the broad phase may get new contacts. Only a kinematic body can
+// be free then, since its contacts are those with dynamic bodies, which are few compared to walls.
 #pragma once
 
 #include <box2d/b2_body.h>
+#include <box2d/b2_collision.h>
 
+#include <array>
+#include <cstddef>
 #include <vector>
 
 class b2World;
+struct b2FixtureProxy;
 
 namespace flatland {
+namespace free_motion {
+
+// Bodies with more fixtures than this are left to Box2D.
+inline constexpr std::size_t kMostFixtures = 8;
+
+struct FreeState {
+  b2Vec2 center;
+  float angle = 0.0F;
+  b2Vec2 velocity;
+  float omega = 0.0F;
+  float sleep_time = 0.0F;
+};
+
+// A fixture that moves, its new box, and the displacement of the box.
+struct MovedBox {
+  b2FixtureProxy* proxy;
+  b2AABB box;
+  b2Vec2 displacement;
+};
+
+// The motion of a free body in a step.
+struct Move {
+  b2Body* body = nullptr;
+  FreeState state;
+  b2Transform to;
+  std::array<MovedBox, kMostFixtures> boxes;
+  std::size_t count = 0;
+  bool are_kept = true;  // whether the broad phase keeps its boxes of all fixtures
+};
+
+}  // namespace free_motion
 
 class FreeMotion {
  public:
@@ -26,6 +64,8 @@ class FreeMotion {
 
  private:
   std::vector<b2Body*> moved_;
+  std::vector<free_motion::Move> leaving_;
+  std::vector<b2Body*> dynamic_;
 };
 
 }  // namespace flatland

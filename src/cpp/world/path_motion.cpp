@@ -5,6 +5,7 @@
 #include "angles.h"
 #include "split_mix.h"
 #include "world/bodies.h"
+#include "world/joined_bodies.h"
 
 namespace flatland {
 namespace {
@@ -181,6 +182,45 @@ void hold_path(World& world, b2Body* body, const PathMotion& motion) {
     set_pose(world, body, motion.pose);
   }
   if (motion.is_dynamic) set_velocity(body, motion.velocity);
+}
+
+void place_on_path(World& world, b2Body* body, PathMotion& motion, double share) {
+  const Path& path = *motion.path;
+  if (!motion.is_started || path.mode == Path::Mode::kOnce) return;
+  PathMotion first = motion;
+  first.pose = path.waypoints[0];
+  first.waypoint = 0;
+  first.is_forward = true;
+  first.is_moving = first.is_finished = false;
+  first.legs = 0;
+  const auto begin_next = [&](PathMotion& each) {
+    choose_next(each);
+    begin_leg(each, path.wait);
+    ++each.legs;
+    return duration_of(each);
+  };
+  const std::size_t count = path.waypoints.size();
+  const std::size_t legs = path.mode == Path::Mode::kThereAndBack ? 2 * (count - 1) : count;
+  double round = 0.0;
+  PathMotion measured = first;
+  for (std::size_t i = 0; i < legs; ++i) {
+    round += begin_next(measured);
+    arrive(measured);
+  }
+  double left = share * round;
+  for (std::size_t i = 0; i < legs; ++i) {
+    const double duration = begin_next(first);
+    if (left < duration) {
+      first.time = left;
+      first.pose = pose_at(first, left);
+      break;
+    }
+    left -= duration;
+    arrive(first);
+  }
+  first.velocity = {};
+  motion = first;
+  place_with_joined(world, body, motion.pose);
 }
 
 void restart_path(PathMotion& motion, const Triple& pose) {

@@ -72,6 +72,12 @@ struct PathMotion {
 void advance_path(b2Body* body, PathMotion& motion, double dt);
 // Moves the body to the pose of the motion.
 void hold_path(World& world, b2Body* body, const PathMotion& motion);
+// Moves the body to where it is in a round of the waypoints. Has no effect in mode kOnce, and on a
+// body that is not started.
+//
+// `share` is the time since the first waypoint as a share of the duration of the round, from 0
+// to 1.
+void place_on_path(World& world, b2Body* body, PathMotion& motion, double share);
 // Continues from another pose of the body.
 void restart_path(PathMotion& motion, const Triple& pose);
 

@@ -264,3 +264,75 @@ def test_errors(plugin_world: Any, text: str, message: str) -> None:
     error = plugin_world.error(entry(text), bodies=KINEMATIC)
     assert message in error
     assert "robot.model.yaml" in error
+
+
+class TestRandomStart:
+    @pytest.mark.parametrize("mode", ["loop", "there_and_back", "random"])
+    @pytest.mark.parametrize("heading", ["waypoint", "forward"])
+    def test_starts_are_places_of_the_motion_in_proportion_to_time(
+        self, follow: Any, mode: str, heading: str
+    ) -> None:
+        text = f"waypoints: [[3, 0], [3, 1]], mode: {mode}, heading: {heading}, wait: 1, speed: 0.5"
+        world = follow(text)
+        starts = []
+        for seed in range(300):
+            world.randomize(seed)
+            starts.append(pose(world))
+            x, y, _ = starts[-1]
+            on_sides = [abs(y) < 1e-6, abs(x - 3) < 1e-5]
+            if mode != "there_and_back":
+                on_sides.append(abs(x - 3 * y) < 1e-5)
+            assert any(on_sides)
+        assert len(set(starts)) > 100
+        if mode == "there_and_back" and heading == "waypoint":
+            # 8 s on each way, of which 1 s at each end and at the middle.
+            shares = [sum(abs(x - 3) > 1e-5 and x > 1e-5 for x, _, _ in starts) / 300]
+            assert shares[0] == pytest.approx(12 / 20, abs=0.1)
+
+    def test_the_motion_continues_from_the_start(self, follow: Any) -> None:
+        world = follow("waypoints: [[3, 0], [3, 2]], speed: 1, acceleration: 1, wait: 0.5")
+        motion = []
+        for _ in range(3000):
+            world.step()
+            motion.append(pose(world))
+        for seed in range(5):
+            world.randomize(seed)
+            previous = pose(world)
+            for _ in range(300):
+                world.step()
+                x, y, _ = pose(world)
+                assert math.hypot(x - previous[0], y - previous[1]) <= 0.01 + 1e-5
+                previous = pose(world)
+                nearest = min(math.hypot(x - a, y - b) for a, b, _ in motion[500:])
+                assert nearest <= 0.01
+
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "waypoints: [[3, 0]], redraw: false",
+            "waypoints: [[3, 0]], mode: once",
+            "waypoints: [[3, 0]], start: false, start_topic: go",
+            "waypoints: [[0, 0]]",
+        ],
+    )
+    def test_some_paths_begin_at_the_initial_pose(self, follow: Any, text: str) -> None:
+        world = follow(text)
+        world.randomize(1)
+        assert pose(world) == (0.0, 0.0, 0.0)
+
+    def test_bodies_on_joints_move_along(self, follow: Any) -> None:
+        arm = KINEMATIC + (
+            "- {name: arm, pose: [1, 0, 0], footprints: [{type: circle, radius: 0.1, density: 1}]}"
+        )
+        joints = "[{type: weld, name: joint, bodies: [{name: base, anchor: [1, 0]}, "
+        joints += "{name: arm, anchor: [0, 0]}]}]"
+        world = follow("waypoints: [[5, 0, 1.5], [5, 5, 3]]", bodies=arm, joints=joints)
+        for seed in range(5):
+            world.randomize(seed)
+            x, y, theta = pose(world)
+            ahead = (x + math.cos(theta), y + math.sin(theta))
+            assert world.model("robot").body("arm").pose[:2] == pytest.approx(ahead, abs=1e-5)
+            world.step(5)
+            x, y, theta = pose(world)
+            ahead = (x + math.cos(theta), y + math.sin(theta))
+            assert world.model("robot").body("arm").pose[:2] == pytest.approx(ahead, abs=0.05)

@@ -128,6 +128,110 @@ def test_reseeding_decides_all_further_random_numbers(files: WorldFiles) -> None
     assert hashes[0] == hashes[1] != hashes[2]
 
 
+@pytest.mark.parametrize("options", [FULL, FULL + "model: orca, ", FULL + "body_type: dynamic, "])
+def test_the_places_of_an_episode_are_drawn_by_its_seed(files: WorldFiles, options: str) -> None:
+    world = load(files, CROWD, options)
+    world.step(100)
+    snapshot = world.snapshot()
+    before = world.state_hash()
+    starts, ends = [], []
+    for seed in (1, 2, 1):
+        world.restore(snapshot)
+        assert world.state_hash() == before
+        world.randomize(seed)
+        starts.append(people_of(world).people.poses)
+        assert not people_of(world).people.velocities.any()
+        world.step(300)
+        ends.append(world.state_hash())
+    assert ends[0] == ends[2] != ends[1]
+    assert starts[0].tobytes() == starts[2].tobytes()
+    assert (np.abs(starts[0] - starts[1]).max(axis=1) > 0).all()
+
+
+def test_drawn_places_are_free_and_together(files: WorldFiles) -> None:
+    groups = (
+        "[{name: a, count: 6, together: 3}, {name: b, count: 4, area: [0, 0, 4, 5]},"
+        " {name: c, count: 0}]"
+    )
+    world = load(files, groups, "layers: [body], legs: {layers: [2d]}, ")
+    people = people_of(world)
+    people.spawn("c", poses=[(5.0, 3.0, 0.0)])
+    for seed in range(40):
+        world.randomize(seed)
+        poses = people.people.poses
+        distances = np.hypot(*(poses[:, None, :2] - poses[None, :, :2]).transpose(2, 0, 1))
+        np.fill_diagonal(distances, np.inf)
+        assert distances.min() >= 0.44 - 1e-6
+        assert all(world.is_free(tuple(p), radius=0.2, ignore=world.models) for p in poses)
+        assert (poses[6:10, :2] <= [4, 5]).all()
+        assert tuple(poses[10]) == (5.0, 3.0, 0.0)  # The pose was given, not drawn.
+        # The other members of the first party are the people who are nearest to its first one.
+        to_first = np.hypot(*(poses[1:6, :2] - poses[0, :2]).T)
+        assert to_first[:2].max() <= to_first[2:].min()
+        for name in people.people.names[:10]:
+            model = world.model(name)
+            body = np.array(model.body("body").pose)
+            for leg, side in (("left_leg", 0.1), ("right_leg", -0.1)):
+                x, y, theta = model.body(leg).pose
+                offset = side * np.array([-math.sin(body[2]), math.cos(body[2])])
+                assert [x, y, theta] == pytest.approx([*(body[:2] + offset), body[2]], abs=1e-5)
+
+
+def test_people_begin_their_routes_again(files: WorldFiles) -> None:
+    groups = (
+        "[{name: a, count: 3, speed_deviation: 0, order: once,"
+        " waypoints: [{at: [2, 2]}, {at: [8, 4], queue: true, wait: [1, 2]}]}]"
+    )
+    world = load(files, groups, CALM)
+    snapshot = world.snapshot()
+    world.step(4000)
+    world.randomize(1)
+    # Nothing remains of what the people did before.
+    assert not people_of(world).people.standing.any()
+    world.restore(snapshot)
+    world.step(4000)
+    assert people_of(world).people.standing.any()
+
+
+def test_people_keep_their_places_without_redraw(files: WorldFiles) -> None:
+    world = load(files, CROWD, FULL + "redraw: false, ")
+    before = people_of(world).people.poses
+    world.randomize(1)
+    assert people_of(world).people.poses.tobytes() == before.tobytes()
+    one = world.state_hash()
+    world.randomize(2)
+    assert world.state_hash() != one  # Their random numbers are new.
+
+
+def test_too_few_places_are_an_error(files: WorldFiles) -> None:
+    world = load(files, "[{name: a, count: 1, area: [1.2, 1.2, 2.5, 2.5]}]")
+    box = (
+        "bodies: [{name: box, footprints: [{type: polygon, density: 1, points:"
+        " [[-3, -3], [3, -3], [3, 3], [-3, 3]]}]}]\n"
+    )
+    files.write("box.model.yaml", box)
+    world.spawn_model("box.model.yaml", "box", pose=(2, 2, 0), if_blocked="allow")
+    with pytest.raises(WorldError, match=r'plugin "people": no free place for "a_0" of group "a"'):
+        world.randomize(1)
+    with pytest.raises(ValueError, match="seed must not be negative, got -1"):
+        world.randomize(-1)
+
+
+def test_a_recording_repeats_drawn_places(files: WorldFiles, tmp_path: Any) -> None:
+    from flatland.recording import Replay
+
+    world = load(files, CROWD, FULL)
+    recorder = world.record(tmp_path / "run.log")
+    world.step(50)
+    world.randomize(7)
+    world.step(50)
+    recorder.close()
+    replay = Replay(tmp_path / "run.log")
+    assert replay.run() is None
+    assert replay.world.state_hash() == world.state_hash()
+    replay.close()
+
+
 def test_a_recording_repeats_spawned_and_directed_people(files: WorldFiles, tmp_path: Any) -> None:
     from flatland.recording import Replay
 

@@ -260,3 +260,30 @@ def test_a_moved_model_returns_to_its_path(plugin_world: Any) -> None:
     world.step()
     world.move_model("robot", (5, 5, 5))
     assert poses(world, 1)[0] == pytest.approx((0.5, 0, 0), abs=1e-6)
+
+
+@pytest.mark.parametrize("mode", ["yoyo", "loop"])
+def test_random_starts_are_in_both_directions(plugin_world: Any, mode: str) -> None:
+    world = plugin_world(
+        tween(f"delta: [2, 0, 1], duration: 1, mode: {mode}"), bodies=STATIC, step_size=0.01
+    )
+    directions = set()
+    for seed in range(20):
+        world.randomize(seed)
+        x, _, theta = world.model("robot").body("base").pose
+        assert 0 <= x <= 2
+        assert theta == pytest.approx(x / 2, abs=1e-5)
+        (after,) = xs(world, 1)
+        if 0.03 < x < 1.97:
+            assert abs(after - x) == pytest.approx(0.02, abs=1e-5)
+            directions.add(after > x)
+    assert directions == ({True, False} if mode == "yoyo" else {True})
+
+
+@pytest.mark.parametrize(
+    "entry", ["mode: once", "mode: trigger, trigger_topic: t", "redraw: false"]
+)
+def test_some_tweens_begin_at_the_initial_pose(plugin_world: Any, entry: str) -> None:
+    world = plugin_world(tween(f"delta: [2, 0, 1], {entry}"), bodies=STATIC)
+    world.randomize(1)
+    assert world.model("robot").body("base").pose == (0, 0, 0)

@@ -1,0 +1,40 @@
+#include "crowd/ways.h"
+
+#include <utility>
+
+namespace flatland::crowd {
+
+Way::Way(const FreeGrid& grid, std::shared_ptr<const Walls> walls, const std::vector<Gate>& gates,
+         const Place& place)
+    : place_(place), close_(3.0 * grid.cell()), walls_(std::move(walls)), field_(grid, place) {
+  from_gates_.reserve(gates.size());
+  for (const Gate& gate : gates) from_gates_.push_back(from(gate.center));
+}
+
+Vec Way::from(Vec p) const {
+  const Vec straight = place_.nearest(p) - p;
+  if (square(straight) < close_ * close_ && walls_->is_clear(p, p + straight)) {
+    return unit(straight);
+  }
+  return field_.direction(p, *walls_);
+}
+
+Ways::Ways(FreeGrid grid, std::shared_ptr<const Walls> walls)
+    : grid_(std::move(grid)), walls_(std::move(walls)), gates_(find_gates(grid_, *walls_)) {}
+
+std::shared_ptr<const Way> Ways::to(const Place& place) {
+  Entry* entry = nullptr;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    // The nodes of a map remain where they are.
+    entry = &entries_[{place.low.x, place.low.y, place.high.x, place.high.y, place.radius}];
+  }
+  std::call_once(entry->is_computed, [&] { entry->way = to_temporary(place); });
+  return entry->way;
+}
+
+std::shared_ptr<const Way> Ways::to_temporary(const Place& place) const {
+  return std::make_shared<const Way>(grid_, walls_, gates_, place);
+}
+
+}  // namespace flatland::crowd
