@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import FlatlandError
 from flatland.scenarios.controllers.dynamic_window import DynamicWindow
-from flatland.scenarios.controllers.gap import FollowGap
 from flatland.scenarios.controllers.pursuit import PurePursuit
 from flatland.scenarios.controllers.random_walk import RandomWalk
-from flatland.scenarios.controllers.straight import Straight
+from flatland.scenarios.controllers.reactive import Gap, Straight
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 INCLUDED: Final[dict[str, type[Controller]]] = {
     "straight": Straight,
-    "gap": FollowGap,
+    "gap": Gap,
     "pursuit": PurePursuit,
     "dynamic_window": DynamicWindow,
     "random": RandomWalk,
