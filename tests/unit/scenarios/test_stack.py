@@ -23,7 +23,7 @@ pytestmark = pytest.mark.ros
 
 # Drives straight to the goal by the transform map -> base, one command for each scan.
 NODE = """
-import math, subprocess, sys, threading, time
+import math, os, signal, subprocess, sys, threading, time
 import rospy, tf2_ros
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped, Twist
 from nav_msgs.msg import OccupancyGrid
@@ -53,6 +53,8 @@ def on_goal(message):
     if mode == "ends":
         print("\\033[31mthe battery is empty\\033[0m", flush=True)
         rospy.signal_shutdown("test")
+    if mode == "kills":
+        os.kill(os.getppid(), signal.SIGKILL)
     if mode == "floods":
         threading.Thread(target=flood, daemon=True).start()
 
@@ -161,7 +163,7 @@ def test_the_error_of_the_localization_is_measured(drive):
 
 
 def test_a_stack_that_fails_is_a_failed_run(drive):
-    modes = ["stack.launch mode:=ends", "ends", "absent", "nan", "floods", "silent"]
+    modes = ["stack.launch mode:=ends", "ends", "absent", "nan", "floods", "silent", "kills"]
     rows = dict(zip(modes, drive(*modes), strict=True))
     assert {row["outcome"] for row in rows.values()} == {"error"}
     errors = {mode: row["error"] for mode, row in rows.items()}
@@ -174,6 +176,8 @@ def test_a_stack_that_fails_is_a_failed_run(drive):
     assert "a command that is not finite" in errors["nan"]
     assert "sent more than 200 commands per second" in errors["floods"]
     assert "sent no command for 10 s" in errors["silent"]
+    # The node ends the worker process, and is ended with it.
+    assert "ended in each of 3 attempts (signal 9)" in errors["kills"]
 
 
 def test_a_stack_that_is_not_ready_in_time_is_a_failed_run(drive):
