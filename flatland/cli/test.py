@@ -14,6 +14,7 @@ from flatland.cli.progress import StopSignals, counting_bar
 from flatland.config.collecting_reader import ErrorCollector
 from flatland.errors import Place
 from flatland.scenarios.cluster import Cluster
+from flatland.scenarios.columns import FAULTS
 from flatland.scenarios.comparison import Difference, became_worse, compare
 from flatland.scenarios.controllers import INCLUDED, POLICY
 from flatland.scenarios.episode import Options, Result
@@ -23,6 +24,7 @@ from flatland.scenarios.results import SuiteResults, read_results, write_results
 from flatland.scenarios.scenario import Run, Scenario
 from flatland.scenarios.seeds import parse_seeds
 from flatland.scenarios.sketch import sketch
+from flatland.scenarios.stack_options import LOCALIZATIONS, PACES, StackOptions
 from flatland.scenarios.suite import (
     SUITES,
     Plan,
@@ -42,6 +44,7 @@ _EXAMPLES = (
     "flatland test my/scenarios --robot my.py:MyController,gap --out results",
     "flatland test my/scenarios --robot my.py:MyController --baseline old/results.json",
     "flatland test office maze --robot gap --seeds 0:20 --ray",
+    "flatland test office --robot 'stack.launch planner:=dwa' --goal-action move_base",
 )
 _MEGABYTE = 1 << 20
 
@@ -71,7 +74,8 @@ def add(commands: Commands) -> None:
         default="gap",
         metavar="CONTROLLERS",
         help=f"names, separated by commas: {', '.join([*INCLUDED, POLICY])}, FILE.py:NAME, "
-        "MODULE:NAME or FILE.onnx (default: gap)",
+        "MODULE:NAME, FILE.onnx, 'FILE.launch ARG:=VALUE ...' or 'command: PROGRAM ...' "
+        "(default: gap)",
     )
     parser.add_argument(
         "--seeds", type=_seeds, metavar="LIST", help="in place of those of the files: 0:20 or 1,5:9"
@@ -98,6 +102,7 @@ def add(commands: Commands) -> None:
         metavar="FOLDER",
         help="folder that Ray copies to all machines; it must contain all files",
     )
+    _add_stack(parser.add_argument_group("controllers that are ROS nodes"))
     group = parser.add_argument_group("limits of a run")
     for name, default, text in (
         ("command-limit", limits.command_time, "wall time of a call of the controller [s]"),
@@ -145,6 +150,43 @@ def _add_results(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--markdown", action="store_true", help="print the table in the form of Markdown"
+    )
+
+
+def _add_stack(group: argparse._ArgumentGroup) -> None:
+    stack = StackOptions()
+    group.add_argument(
+        "--pace",
+        choices=PACES,
+        default=stack.pace,
+        help="lockstep: the simulated time waits for the command of each period; real-time: a run "
+        f"that does not hold it is invalid (default: {stack.pace})",
+    )
+    group.add_argument(
+        "--localization",
+        choices=LOCALIZATIONS,
+        default=stack.localization,
+        help="who sends the transform from map to the frame of the odometry: true for the "
+        f"simulator, without an error (default: {stack.localization})",
+    )
+    group.add_argument(
+        "--goal-topic",
+        default=stack.goal_topic,
+        metavar="TOPIC",
+        help=f"topic of the goals, geometry_msgs/PoseStamped (default: {stack.goal_topic})",
+    )
+    group.add_argument(
+        "--goal-action",
+        default="",
+        metavar="NAME",
+        help="action of the goals instead, move_base_msgs/MoveBaseAction, such as move_base",
+    )
+    group.add_argument(
+        "--start-limit",
+        type=positive,
+        default=stack.start_time,
+        metavar="X",
+        help=f"wall time until the nodes are ready [s] (default: {stack.start_time:g})",
     )
 
 
@@ -205,7 +247,18 @@ def _load(options: argparse.Namespace) -> list[Scenario] | None:
 def _run(options: argparse.Namespace, runs: Sequence[Run], stop: StopSignals) -> SuiteResults:
     folder = options.working_dir or "."
     plan = Plan(
-        Options(str(Path(folder).absolute()), str(options.out.absolute()), options.record),
+        Options(
+            str(Path(folder).absolute()),
+            str(options.out.absolute()),
+            options.record,
+            StackOptions(
+                options.pace,
+                options.localization,
+                options.goal_topic,
+                options.goal_action,
+                options.start_limit,
+            ),
+        ),
         WorkerLimits(
             options.command_limit,
             options.run_limit,
@@ -222,7 +275,7 @@ def _run(options: argparse.Namespace, runs: Sequence[Run], stop: StopSignals) ->
         counts = {"failed": 0, "errors": 0}
 
         def on_result(result: Result) -> None:
-            counts["errors"] += result.row["outcome"] == "error"
+            counts["errors"] += result.row["outcome"] in FAULTS
             counts["failed"] += not result.row["passed"]
             advance(f"failed: {counts['failed']}, errors: {counts['errors']}")
 
@@ -317,7 +370,7 @@ def _exit_code(
     if not any(comparisons.values()):
         return 1
     is_worse = any(became_worse(differences) for differences in comparisons.values())
-    return 1 if is_worse or any(row["outcome"] == "error" for row in results.rows) else 0
+    return 1 if is_worse or any(row["outcome"] in FAULTS for row in results.rows) else 0
 
 
 # -- types of values -----------------------------------------------------------------------

@@ -228,9 +228,9 @@ class Placement:
         # Plugins may have added or moved walls since.
         if known is not None and np.array_equal(known[0], walls):
             return known[1]
-        bodies = [layer.body.physics for layer in layers]
 
         def fits(points: DoubleArray, disc: float) -> BoolArray:
+            bodies = [layer.body.physics for layer in layers]  # A reset replaces them.
             return self._physics.free_discs(_poses(points, 0.0), disc, bits, only=bodies)
 
         space = FreeSpace(walls, area, radius, clearance, fits)

@@ -33,6 +33,9 @@ class Column:
     is_timing: bool = False
 
 
+FAULTS: Final = ("error", "invalid")
+"""Outcomes of runs that say nothing about how the robot drives."""
+
 KEY: Final = ("scenario", "controller", "seed")
 """The columns that identify a row."""
 
@@ -63,6 +66,8 @@ COLUMNS: Final = {
         Column("intrusion_time", float, "s", "less"),
         Column("energy", float, "J", "less"),
         Column("final_distance", float, "m", "less"),
+        Column("localization_error", float, "m", "less"),
+        Column("max_localization_error", float, "m", "less"),
         Column("start_x", float, "m"),
         Column("start_y", float, "m"),
         Column("goal_x", float, "m"),
@@ -71,6 +76,7 @@ COLUMNS: Final = {
         Column("state_hash", str),
         Column("failures", str),
         Column("error", str),
+        Column("late_commands", int, is_timing=True),
         Column("command_time", float, "ms", is_timing=True),
         Column("max_command_time", float, "ms", is_timing=True),
         Column("real_time_factor", float, is_timing=True),

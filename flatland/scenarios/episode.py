@@ -10,6 +10,7 @@ import socket
 import time
 import traceback
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -21,7 +22,9 @@ from flatland.scenarios.events import Events
 from flatland.scenarios.measures import Measures, distance_left, success_weighted_length
 from flatland.scenarios.outline import outline_of
 from flatland.scenarios.planner import PlanningError, shortest_length
-from flatland.scenarios.stage import Stage, prepare
+from flatland.scenarios.stack import Stack, StackError, opened
+from flatland.scenarios.stack_options import StackCommand, StackOptions
+from flatland.scenarios.stage import Stage, drive_topic, prepare
 from flatland.scenarios.worlds import world_file
 from flatland.values import Twist
 from flatland.world import World
@@ -46,11 +49,13 @@ class Options:
         folder: Folder that relative paths of controllers start from.
         out: Folder of random worlds and recordings.
         record: Which runs are recorded: `failed`, `all` or `none`.
+        stack: How ROS nodes are controllers.
     """
 
     folder: str
     out: str
     record: str = "failed"
+    stack: StackOptions = field(default_factory=StackOptions)
 
 
 @dataclass(slots=True)
@@ -96,10 +101,8 @@ def run_scenario(
             raise  # The process is replaced.
     finally:
         wall_time = time.perf_counter() - start
-        simulated = result.row["time"] or 0.0
         result.row |= {
             "wall_time": wall_time,
-            "real_time_factor": simulated / wall_time if wall_time > 0 else None,
             "worker": f"{socket.gethostname()}:{os.getpid()}",
         }
     return result
@@ -109,7 +112,7 @@ def describe(error: BaseException) -> str:
     """Returns the type, text and innermost line of code of an error."""
     if isinstance(error, FlatlandError):
         return error.text_with_hint
-    if isinstance(error, FailedRunError | PlanningError):
+    if isinstance(error, FailedRunError | PlanningError | StackError):
         return str(error)
     text = f"{type(error).__name__}: {error}"
     frames = traceback.extract_tb(error.__traceback__)
@@ -132,9 +135,23 @@ def _run(
     run: Run, options: Options, result: Result, begin_command: Callable[[bool], object]
 ) -> None:
     scenario, out = run.scenario, Path(options.out)
-    create = find_controller(run.controller, options.folder)
+    found = find_controller(run.controller, options.folder)
     path = world_file(scenario, run.seed, out / "worlds")
-    with World.from_yaml(path, seed=run.seed, params=dict(scenario.params)) as world:
+    with ExitStack() as closing:
+        stack: Stack | None = None
+        if isinstance(found, StackCommand):
+            stack = closing.enter_context(opened(found, options.stack))
+            create: Callable[[Any], Any] = stack.controller
+        else:
+            create = found
+        world = closing.enter_context(
+            World.from_yaml(
+                path,
+                seed=run.seed,
+                params=dict(scenario.params),
+                observers=[] if stack is None else stack.observers,
+            )
+        )
         result.outline = outline_of(world)
         recording = recording_path(run)
         if options.record != "none":
@@ -142,15 +159,29 @@ def _run(
             world.record(out / recording)
         try:
             stage = prepare(world, run)
+            if stack is not None:
+                topic = drive_topic(stage.robot, scenario.robot)
+                stage = stack.start(run, stage, topic, lambda: prepare(world, run))
             result.outline = outline_of(world)
             result.goals = list(stage.task.goals)
-            drive = _Driver(stage, create, begin_command)
-            _drive(scenario, stage, drive, result)
+            driver = _Driver(stage, create, begin_command)
+            _drive(scenario, stage, driver, result)
+            if stack is not None:
+                result.row |= _validity(stack)
         finally:
             if options.record == "all" or (options.record == "failed" and not result.row["passed"]):
                 result.recording = recording
     if options.record == "failed" and result.row["passed"]:
         (out / recording).unlink(missing_ok=True)
+
+
+def _validity(stack: Stack) -> Row:
+    """Returns the columns of a run that did not hold its rate; nothing for others."""
+    reason = stack.invalid
+    if not reason:
+        return {}
+    row: Row = dict.fromkeys(("error", "failures"), reason)
+    return row | {"outcome": "invalid", "success": False, "passed": False, "spl": None}
 
 
 class _Driver:
@@ -200,6 +231,11 @@ class _Driver:
             raise FailedRunError(f"recoveries of the controller must be a count, got {count!r}")
         return count
 
+    @property
+    def measures(self) -> Row:
+        """Columns that only nodes have."""
+        return self._controller.values if isinstance(self._controller, Stack) else {}
+
     def _checked(self, twist: object) -> Twist:
         """Returns a command within the limits.
 
@@ -230,13 +266,14 @@ def _drive(scenario: Scenario, stage: Stage, driver: _Driver, result: Result) ->
     steps_per_period = max(1, round(stage.task.period / step_size))
     events, measures = Events(scenario, stage), Measures(stage)
     reached, outcome, steps = 0, "", 0
+    start = time.perf_counter()
     try:
         while not outcome:
             events.update(reached)
             if events.kidnapped:
                 measures.moved()
             x, y, _theta = stage.robot.pose
-            result.events += [(world.time, x, y, action) for action in events.done]
+            result.events += [(stage.time, x, y, action) for action in events.done]
             if steps % steps_per_period == 0:
                 measures.sample()
                 # Before the first step, there is no scan.
@@ -255,6 +292,7 @@ def _drive(scenario: Scenario, stage: Stage, driver: _Driver, result: Result) ->
             if not outcome and steps >= last:
                 outcome = "timeout"
     finally:
+        wall_time = time.perf_counter() - start
         measures.sample()
         result.path = _thinned(measures.path)
         result.row |= measures.values()
@@ -262,7 +300,7 @@ def _drive(scenario: Scenario, stage: Stage, driver: _Driver, result: Result) ->
             "outcome": outcome,
             "success": outcome == "reached",
             "goals": reached,
-            "time": world.time,
+            "time": stage.time,
             "start_x": stage.start[0],
             "start_y": stage.start[1],
             "goal_x": goals[-1][0],
@@ -272,6 +310,8 @@ def _drive(scenario: Scenario, stage: Stage, driver: _Driver, result: Result) ->
             "state_hash": world.state_hash(),
             "command_time": 1e3 * sum(driver.times) / len(driver.times) if driver.times else None,
             "max_command_time": 1e3 * max(driver.times) if driver.times else None,
+            "real_time_factor": stage.time / wall_time if wall_time > 0 else None,
+            **driver.measures,
         }
     result.row["recoveries"] = driver.recoveries
     result.row |= _efficiency(stage, result.row)

@@ -51,7 +51,7 @@ class Events:
 
     def _is_due(self, trigger: Trigger, goals: int) -> bool:
         if trigger.time is not None:
-            return self._stage.world.time >= trigger.time - 1e-9
+            return self._stage.time >= trigger.time - 1e-9
         if trigger.goals is not None:
             return goals >= trigger.goals
         place = trigger.place or (0.0, 0.0)

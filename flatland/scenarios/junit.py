@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Final
 
+from flatland.scenarios.columns import FAULTS
 from flatland.scenarios.results import SuiteResults
 from flatland.scenarios.summary import group_of
 
@@ -28,7 +29,7 @@ def write_junit(results: SuiteResults, path: Path) -> None:
             time=f"{row['wall_time'] or 0:.3f}",
         )
         if not row["passed"]:
-            kind = "error" if row["outcome"] == "error" else "failure"
+            kind = "error" if row["outcome"] in FAULTS else "failure"
             text = _clean(row["failures"] or "")
             ElementTree.SubElement(case, kind, message=text).text = text
         suites.setdefault(group_of(row), []).append(case)

@@ -41,6 +41,7 @@ class Measures:
 
     def __init__(self, stage: Stage) -> None:
         """Starts at the current pose of the robot."""
+        self._stage = stage
         self._world = stage.world
         self._robot = stage.robot
         self._period = stage.task.period
@@ -97,7 +98,7 @@ class Measures:
     def sample(self) -> None:
         """Adds what is measured once per period: jerk, time stuck, people and the path."""
         x, y, theta = self._pose
-        self.path.append((self._world.time, x, y))
+        self.path.append((self._stage.time, x, y))
         vx, vy, omega = self._velocities[self._robot.name]
         # The speed ahead; the sign distinguishes driving backwards.
         self._speeds.append((vx * math.cos(theta) + vy * math.sin(theta), omega))
@@ -158,7 +159,7 @@ class Measures:
         if not is_stuck:
             self.stuck_for = 0.0
             return
-        now = self._world.time
+        now = self._stage.time
         # At first, the whole window, unless part of it was counted before.
         self.stuck_for += self._period if self.stuck_for else _STUCK_TIME
         self._stuck_time += now - max(now - _STUCK_TIME, self._stuck_until)

@@ -11,7 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
-from flatland.scenarios.columns import COLUMNS, Row
+from flatland.scenarios.columns import COLUMNS, FAULTS, Row
 from flatland.scenarios.comparison import Difference
 from flatland.scenarios.episode import Result
 from flatland.scenarios.pictures import run_picture, strip_plot
@@ -84,7 +84,7 @@ def worst_first(results: Iterable[Result]) -> list[Result]:
         row = result.row
         clearance = math.inf if row["clearance"] is None else row["clearance"]
         return (
-            row["outcome"] != "error",
+            row["outcome"] not in FAULTS,
             row["passed"],
             row["success"],
             row["spl"] or 0.0,
@@ -97,7 +97,7 @@ def worst_first(results: Iterable[Result]) -> list[Result]:
 def _heading(results: SuiteResults, report: Report) -> str:
     rows = results.rows
     passed = sum(row["passed"] for row in rows)
-    errors = sum(row["outcome"] == "error" for row in rows)
+    errors = sum(row["outcome"] in FAULTS for row in rows)
     parts = [f"{passed} of {len(rows)} runs passed"]
     if errors:
         parts.append(f"{errors} with an error")

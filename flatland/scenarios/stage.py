@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from flatland.entities.model import Model
     from flatland.geometry import Pose, Vector2
     from flatland.plugin_api.ports import CommandTopic
-    from flatland.scenarios.scenario import Run, Scenario
+    from flatland.scenarios.scenario import Robot, Run, Scenario
     from flatland.world import World
 
 _MAX_TRIES: Final = 100  # of random goals
@@ -45,6 +45,7 @@ class Stage:
         task: What the controller has to do.
         start: Initial pose of the robot [m, rad].
         people: The plugin of people, None without one.
+        start_time: Simulated time of the world at the start of the run [s].
     """
 
     world: World
@@ -53,6 +54,12 @@ class Stage:
     task: Task
     start: Pose
     people: Pedestrians | None
+    start_time: float
+
+    @property
+    def time(self) -> float:
+        """Simulated time since the start of the run [s]."""
+        return self.world.time - self.start_time
 
     @property
     def robot(self) -> Model:
@@ -97,8 +104,13 @@ def prepare(world: World, run: Run) -> Stage:
         max_turn=wanted.max_turn,
         rng=generator(run.seed, "controller"),
     )
-    drive = world.command("/".join(filter(None, (robot.namespace, wanted.cmd_vel))))
-    return Stage(world, LaserReader(world, robot, laser), drive, task, start, people)
+    drive = world.command(drive_topic(robot, wanted))
+    return Stage(world, LaserReader(world, robot, laser), drive, task, start, people, world.time)
+
+
+def drive_topic(robot: Model, wanted: Robot) -> str:
+    """Returns the topic of the command of a robot."""
+    return "/".join(filter(None, (robot.namespace, wanted.cmd_vel)))
 
 
 def generator(seed: int, purpose: str) -> np.random.Generator:

@@ -13,7 +13,7 @@ from typing import Final
 from flatland.config import hints
 from flatland.config.reader import ReadYaml, read_yaml
 from flatland.errors import FlatlandError
-from flatland.scenarios.controllers import controller_digest
+from flatland.scenarios.controllers import controller_digest, is_stack
 from flatland.scenarios.episode import Options, Result
 from flatland.scenarios.reader import is_scenario_file, read_scenarios
 from flatland.scenarios.results import Journal, SuiteResults, key_of
@@ -106,7 +106,7 @@ def runs_of(
     ]
 
 
-def definition_of(runs: Sequence[Run], folder: str) -> str:
+def definition_of(runs: Sequence[Run], options: Options) -> str:
     """Returns a hash of everything that results depend on, except for the files of worlds.
 
     Raises:
@@ -114,7 +114,9 @@ def definition_of(runs: Sequence[Run], folder: str) -> str:
     """
     digest = hashlib.sha256(VERSION.encode())
     for name in dict.fromkeys(run.controller for run in runs):
-        digest.update(f"{name} {controller_digest(name, folder)}\n".encode())
+        digest.update(f"{name} {controller_digest(name, options.folder)}\n".encode())
+        if is_stack(name):
+            digest.update(f"{options.stack!r}\n".encode())
     for run in runs:
         digest.update(f"{run!r}\n".encode())
     return digest.hexdigest()[:32]
@@ -179,7 +181,7 @@ def run_suite(
     if len(order) < len(runs):
         raise SuiteError("two scenario files have the same name; run them separately")
     folder = Path(plan.options.out)
-    journal = Journal(folder, definition_of(runs, plan.options.folder), continues=plan.continues)
+    journal = Journal(folder, definition_of(runs, plan.options), continues=plan.continues)
     try:
         for result in journal.results.results:
             on_result(result)

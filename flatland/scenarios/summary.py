@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from flatland.scenarios.columns import Row
+from flatland.scenarios.columns import FAULTS, Row
 from flatland.scenarios.statistics import bootstrap_interval, wilson_interval
 
 MEANS: Final = ("spl", "time", "path_length", "collisions", "clearance", "jerk", "command_time")
@@ -80,7 +80,7 @@ def _summary(group: str, controller: str, rows: Sequence[Row]) -> Summary:
         group,
         controller,
         len(own),
-        sum(row["outcome"] == "error" for row in own),
+        sum(row["outcome"] in FAULTS for row in own),
         _rate([row["passed"] for row in own]),
         _rate([row["success"] for row in own]),
         {name: _mean(name, own) for name in MEANS},

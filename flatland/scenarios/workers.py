@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from flatland.scenarios.columns import error_row
+from flatland.scenarios.controllers import is_stack
 from flatland.scenarios.episode import Options, Result, recording_path, run_scenario
+from flatland.scenarios.programs import MARK, end_marked, new_mark
 from flatland.scenarios.scenario import Run
 
 MAX_ATTEMPTS: Final = 3
@@ -59,11 +61,12 @@ class _Worker:
 
     def __init__(self, options: Options, limits: WorkerLimits) -> None:
         self.connection, theirs = _CONTEXT.Pipe()
+        self._mark = new_mark()
         self._limits = limits
         # Start of the current call of a controller, 0 outside of calls [s].
         self._began = _CONTEXT.Value("d", 0.0, lock=False)
         self._process = _CONTEXT.Process(
-            target=_work, args=(theirs, self._began, options, limits), daemon=True
+            target=_work, args=(theirs, self._began, options, limits, self._mark), daemon=True
         )
         self._process.start()
         theirs.close()
@@ -109,6 +112,7 @@ class _Worker:
         self._process.join(_CHECK_PERIOD if self.connection.closed else 0)
         self._process.kill()
         self._process.join()
+        end_marked(self._mark)
         self.connection.close()
         code = self._process.exitcode or 0
         return f"signal {-code}" if code < 0 else f"exit code {code}"
@@ -156,8 +160,10 @@ class _Pool:
             result = worker.receive()
         except EOFError:
             return self._replace_ended(number)
-        if result is not None and result.row["error"] == OUT_OF_MEMORY:
-            self._replace(number)  # The memory may still be in use.
+        if result is not None and (
+            result.row["error"] == OUT_OF_MEMORY or is_stack(result.row["controller"])
+        ):
+            self._replace(number)  # The memory may still be in use; ROS is started once.
         return result
 
     def _check(self, number: int) -> Result | None:
@@ -226,9 +232,11 @@ def run_in_processes(
 # -- in the worker process -----------------------------------------------------------------
 
 
-def _work(connection: Connection, began: Any, options: Options, limits: WorkerLimits) -> None:
+def _work(
+    connection: Connection, began: Any, options: Options, limits: WorkerLimits, mark: str
+) -> None:
     """Carries out the runs that are received, until the main process ends."""
-    _prepare(limits)
+    _prepare(limits, mark)
 
     def begin_command(is_begin: bool) -> None:
         began.value = time.monotonic() if is_begin else 0.0
@@ -247,9 +255,10 @@ def _work(connection: Connection, began: Any, options: Options, limits: WorkerLi
         connection.send(result)
 
 
-def _prepare(limits: WorkerLimits) -> None:
+def _prepare(limits: WorkerLimits, mark: str) -> None:
     """Leaves Ctrl-C to the main process, ends together with it, and limits the memory."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.environ[MARK] = mark
     logging.getLogger("flatland").setLevel(logging.ERROR)
     if not limits.shows_output:
         null_device = os.open(os.devnull, os.O_WRONLY)
@@ -266,6 +275,7 @@ def _prepare(limits: WorkerLimits) -> None:
 
         def end_with_parent() -> None:
             parent.join()
+            end_marked(mark)
             os._exit(1)
 
         threading.Thread(target=end_with_parent, daemon=True).start()

@@ -18,6 +18,9 @@ import yaml
 from programs import output_of, run_program
 
 import flatland
+from flatland.scenarios.scenario import Run
+from flatland.scenarios.stage import prepare
+from flatland.scenarios.suite import load_suite, scenario_files
 
 NODES = {
     "navigation.launch": {"/flatland_server", "/rviz", "/amcl", "/move_base"},
@@ -25,6 +28,8 @@ NODES = {
     "localization.launch": {"/flatland_server", "/rviz", "/amcl"},
     "localization.launch map:=/a.yaml rviz:=false": {"/flatland_server", "/map_server", "/amcl"},
     "localization.launch map:=none simulator:=false": {"/amcl"},
+    "stack.launch": {"/move_base"},
+    "stack.launch amcl:=true": {"/amcl", "/move_base"},
     "mapping.launch": {"/flatland_server", "/rviz", "/gmapping", "/move_base"},
     "mapping.launch slam:=hector move_base:=false": {
         "/flatland_server",
@@ -102,6 +107,20 @@ def params(resolve: Callable[..., Any]) -> dict[str, Any]:
 def office(checkout: Path) -> Any:
     with flatland.World.from_yaml(checkout / "worlds/office/world.yaml", seed=1) as world:
         yield world
+
+
+def test_the_suite_can_be_run(package):
+    (tour, *others) = load_suite(scenario_files([str(package / "suites")]))
+    assert len(others) == 2
+    goals = yaml.safe_load((package / "tours" / "office.yaml").read_text())["goals"]
+    assert list(tour.goals) == [tuple(goal["pose"][:2]) for goal in goals]
+    with flatland.World.from_yaml(tour.world, seed=1, params=tour.params) as world:
+        stage = prepare(world, Run(tour, "", 1))
+        world.step(100)
+        assert stage.robot.name == "robot"
+        # Sent by the localisation.
+        assert ("map", "odom") not in world.transforms
+        assert ("odom", "base_link") in world.transforms
 
 
 @pytest.mark.ros

@@ -16,7 +16,7 @@ from programs import run_program
 # From the bottom up. A module imports only from floors below its own and from its own room.
 FLOORS = (
     ("defaults", "errors", "geometry", "graph_names", "requirements", "timekeeper", "version"),
-    ("extras", "physics", "values"),
+    ("controllers", "extras", "physics", "values"),
     ("config", "entities"),
     ("copying", "maps", "plugin_api"),
     ("loading", "worldgen"),
@@ -27,7 +27,8 @@ FLOORS = (
     ("simulation", "drawing", "recording"),
     ("web",),
     ("gym", "node", "tools"),
-    ("ros", "ros2", "scenarios"),
+    ("ros", "ros2"),
+    ("scenarios",),
     ("viewer",),
     ("cli",),
     ("__main__",),

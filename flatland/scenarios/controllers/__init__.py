@@ -6,6 +6,7 @@ import functools
 import hashlib
 import importlib
 import importlib.util
+import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -13,10 +14,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import FlatlandError
 from flatland.scenarios.controllers.dynamic_window import DynamicWindow
-from flatland.scenarios.controllers.gap import FollowGap
 from flatland.scenarios.controllers.pursuit import PurePursuit
 from flatland.scenarios.controllers.random_walk import RandomWalk
-from flatland.scenarios.controllers.straight import Straight
+from flatland.scenarios.controllers.reactive import Gap, Straight
+from flatland.scenarios.stack_options import StackCommand
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 INCLUDED: Final[dict[str, type[Controller]]] = {
     "straight": Straight,
-    "gap": FollowGap,
+    "gap": Gap,
     "pursuit": PurePursuit,
     "dynamic_window": DynamicWindow,
     "random": RandomWalk,
@@ -35,6 +36,14 @@ INCLUDED: Final[dict[str, type[Controller]]] = {
 POLICY: Final = "policy"
 """Name of the included policy, which requires the extra `onnx`."""
 _POLICY_FILE: Final = ".onnx"
+
+
+_COMMAND: Final = "command:"
+# The nodes end soon after a request; all their output is shown.
+_ROSLAUNCH: Final = (
+    *("roslaunch", "--screen", "--skip-log-check", "--disable-title", "--no-summary"),
+    *("--sigint-timeout=2", "--sigterm-timeout=1"),
+)
 
 
 class ControllerError(FlatlandError):
@@ -50,12 +59,12 @@ class FunctionController:
         self.command = function
 
 
-def find_controller(name: str, folder: str) -> Callable[[Task], Any]:
-    """Returns the class of a controller, or what creates the controller of a function.
+def find_controller(name: str, folder: str) -> Callable[[Task], Any] | StackCommand:
+    """Returns the class of a controller, what creates that of a function, or what starts nodes.
 
     Args:
-        name: Name of an included controller, `policy`, `FILE.onnx`, `FILE.py:NAME` or
-            `MODULE:NAME`.
+        name: Name of an included controller, `policy`, `FILE.onnx`, `FILE.py:NAME`, `MODULE:NAME`,
+            `FILE.launch ARGUMENTS` or `command: PROGRAM ARGUMENTS`.
         folder: Folder that a relative path of a file starts from; empty for the current one.
 
     Raises:
@@ -64,13 +73,17 @@ def find_controller(name: str, folder: str) -> Callable[[Task], Any]:
     included = INCLUDED.get(name)
     if included is not None:
         return included
+    stack = _stack_command(name, folder)
+    if stack is not None:
+        return stack
     if name == POLICY or name.endswith(_POLICY_FILE):
         return _load_policy(name, folder)
     module_name, colon, attribute = name.rpartition(":")
     if not (colon and module_name and attribute):
         raise ControllerError(
             f"{name!r} does not exist; included are {', '.join([*INCLUDED, POLICY])}, others are "
-            "given as FILE.py:NAME, MODULE:NAME or FILE.onnx"
+            "given as FILE.py:NAME, MODULE:NAME, FILE.onnx, 'FILE.launch ARGUMENTS' or "
+            "'command: PROGRAM ARGUMENTS'"
         )
     try:
         if module_name.endswith(".py"):
@@ -96,13 +109,44 @@ def find_controller(name: str, folder: str) -> Callable[[Task], Any]:
     )
 
 
+def is_stack(name: str) -> bool:
+    """Returns whether a controller consists of ROS nodes."""
+    return name.startswith(_COMMAND) or name.split(" ", 1)[0].endswith(".launch")
+
+
+def _stack_command(name: str, folder: str) -> StackCommand | None:
+    """Returns what starts nodes; None for the name of another controller.
+
+    Raises:
+        ControllerError: The file does not exist, or the arguments are not those of a shell.
+    """
+    if not is_stack(name):
+        return None
+    try:
+        words = shlex.split(name.removeprefix(_COMMAND))
+    except ValueError as error:
+        raise ControllerError(f"{name!r}: {error}") from error
+    if name.startswith(_COMMAND):
+        if not words:
+            raise ControllerError(f"{name!r}: expected a program after {_COMMAND!r}")
+        return StackCommand(tuple(words), "", folder)
+    file = Path(folder, words[0]).expanduser().absolute()
+    if not file.is_file():
+        raise ControllerError(f"file not found: {file}")
+    if importlib.util.find_spec("rospy") is None:
+        raise ControllerError(f"{name!r}: rospy is not installed, which launch files require")
+    return StackCommand((*_ROSLAUNCH, str(file), *words[1:]), str(file), folder)
+
+
 def controller_digest(name: str, folder: str) -> str:
     """Returns a hash of the file of a controller, empty for a controller that is not in a file.
 
     Raises:
         ControllerError: The controller does not exist.
     """
-    find_controller(name, folder)
+    found = find_controller(name, folder)
+    if isinstance(found, StackCommand):
+        return hashlib.sha256(Path(found.file).read_bytes()).hexdigest()[:32] if found.file else ""
     path = name if name.endswith(_POLICY_FILE) else name.rpartition(":")[0]
     if not path.endswith((".py", _POLICY_FILE)):
         return ""

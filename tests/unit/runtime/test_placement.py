@@ -387,6 +387,12 @@ def test_the_default_generator_depends_on_the_seed_of_the_world(
     assert not np.array_equal(first, other.sample_free(5, 0.3))
 
 
+def test_samples_are_equal_after_a_reset(world: flatland.World) -> None:
+    before = world.sample_free(5, 0.3, rng=1, connected_to=(1, 1))
+    world.reset()
+    assert np.array_equal(before, world.sample_free(5, 0.3, rng=1, connected_to=(1, 1)))
+
+
 def test_spawning_at_samples_logs_no_warning(
     world: flatland.World, caplog: pytest.LogCaptureFixture
 ) -> None:

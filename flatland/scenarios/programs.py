@@ -1,0 +1,118 @@
+"""Programs that a run starts: their output, and their end together with the run."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import signal
+import subprocess
+import threading
+import uuid
+from collections import deque
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+MARK: Final = "FLATLAND_RUN"
+"""Variable of the environment that all processes of a run inherit."""
+_LINES: Final = 8  # of the output that are kept
+_MAX_LINE: Final = 300  # characters
+_CHUNK: Final = 1 << 16  # bytes
+_END_TIMEOUT: Final = 5.0  # s between a request to end and the signal KILL
+_COLOURS: Final = re.compile(r"\x1b(\[[0-9;]*[A-Za-z]|\][^\x07]*\x07)")
+# The limit of the memory of a worker process is not meant for its programs.
+_UNLIMITED: Final = ("sh", "-c", 'ulimit -S -v "$(ulimit -H -v)"; exec "$@"', "sh")
+
+
+def new_mark() -> str:
+    """Returns a value of `MARK` that no other process has."""
+    return uuid.uuid4().hex
+
+
+def end_marked(mark: str) -> None:
+    """Ends all processes with a mark by the signal KILL, also those that have left their group.
+
+    Args:
+        mark: Value of `MARK`.
+    """
+    wanted = f"{MARK}={mark}".encode()
+    # A process may start another one meanwhile.
+    while processes := _marked(wanted):
+        for process in processes:
+            with contextlib.suppress(OSError):
+                os.kill(process, signal.SIGKILL)
+
+
+def _marked(wanted: bytes) -> list[int]:
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            # The environment of a process that has ended, but is not collected, is empty.
+            if wanted in (folder / "environ").read_bytes().split(b"\0"):
+                found.append(int(folder.name))
+    return found
+
+
+class Program:
+    """A program with all the processes that it starts."""
+
+    def __init__(self, command: Sequence[str], environment: Mapping[str, str], folder: str) -> None:
+        """Starts the program.
+
+        Args:
+            command: Its path and arguments.
+            environment: Variables in addition to those of this process.
+            folder: The folder that it is started in.
+
+        Raises:
+            OSError: It cannot be started.
+        """
+        self._mark = os.environ.get(MARK) or new_mark()
+        self._process = subprocess.Popen(  # noqa: S603 - the user names the program
+            [*_UNLIMITED, *command],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, **environment, MARK: self._mark},
+            cwd=folder or None,
+            start_new_session=True,
+        )
+        self._lines: deque[str] = deque(maxlen=_LINES)
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    @property
+    def exit_code(self) -> int | None:
+        """Exit code, negative for a signal; None while the program runs."""
+        return self._process.poll()
+
+    @property
+    def last_lines(self) -> str:
+        """The last lines of the output."""
+        return " | ".join(self._lines)
+
+    def end(self) -> None:
+        """Requests the program to end, and ends the processes that remain after some seconds."""
+        if self._process.poll() is None:
+            self._process.terminate()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(_END_TIMEOUT)
+        end_marked(self._mark)
+        self._process.wait()
+        self._reader.join()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+
+    def _read(self) -> None:
+        """Keeps the last lines until all processes have closed the output."""
+        if self._process.stdout is None:
+            return
+        rest = b""
+        while data := os.read(self._process.stdout.fileno(), _CHUNK):
+            *lines, rest = (rest + data).split(b"\n")
+            rest = rest[-_MAX_LINE:]
+            for line in lines[-_LINES:]:
+                text = _COLOURS.sub("", line[:_CHUNK].decode(errors="replace")).strip()
+                if text:
+                    self._lines.append(text[:_MAX_LINE])

@@ -1,0 +1,221 @@
+"""ROS nodes as controllers: real nodes, launch files and worker processes."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rospy", reason="ROS is not installed")
+
+from flatland.scenarios.controllers import ControllerError, find_controller
+from flatland.scenarios.episode import Options
+from flatland.scenarios.programs import Program
+from flatland.scenarios.stack_options import StackOptions
+from flatland.scenarios.suite import runs_of
+from flatland.scenarios.workers import WorkerLimits, run_in_processes
+
+pytestmark = pytest.mark.ros
+
+# Drives straight to the goal by the transform map -> base, one command for each scan.
+NODE = """
+import math, os, signal, subprocess, sys, threading, time
+import rospy, tf2_ros
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped, Twist
+from nav_msgs.msg import OccupancyGrid
+from sensor_msgs.msg import LaserScan
+
+mode = sys.argv[1]
+if mode == "absent":
+    print("no battery")
+    sys.exit(4)
+rospy.init_node("driver")
+transforms = tf2_ros.Buffer()
+listener = tf2_ros.TransformListener(transforms)
+goal = None
+commands = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+if mode == "localizes":
+    sender = tf2_ros.StaticTransformBroadcaster()
+    found = TransformStamped()
+    found.header.frame_id, found.child_frame_id = "map", "odom"
+    found.transform.translation.x, found.transform.rotation.w = 0.2, 1.0
+    sender.sendTransform(found)
+if mode == "leaves":
+    subprocess.Popen(["setsid", "sleep", "4321.5"])
+
+def on_goal(message):
+    global goal
+    goal = message.pose.position
+    if mode == "ends":
+        print("\\033[31mthe battery is empty\\033[0m", flush=True)
+        rospy.signal_shutdown("test")
+    if mode == "kills":
+        os.kill(os.getppid(), signal.SIGKILL)
+    if mode == "floods":
+        threading.Thread(target=flood, daemon=True).start()
+
+def flood():
+    while not rospy.is_shutdown():
+        commands.publish(Twist())
+
+def on_scan(scan):
+    if goal is None or mode == "silent":
+        return
+    command = Twist()
+    # In wall time: the simulated time waits for the command.
+    while not transforms.can_transform("map", "base", scan.header.stamp):
+        if rospy.is_shutdown():
+            return
+        time.sleep(0.001)
+    pose = transforms.lookup_transform("map", "base", scan.header.stamp).transform
+    yaw = 2 * math.atan2(pose.rotation.z, pose.rotation.w)
+    bearing = math.atan2(goal.y - pose.translation.y, goal.x - pose.translation.x) - yaw
+    bearing = math.remainder(bearing, math.tau)
+    command.angular.z = 2 * bearing
+    command.linear.x = 0.5 if abs(bearing) < 0.3 else 0.0
+    if mode == "nan":
+        command.linear.x = math.nan
+    commands.publish(command)
+
+# The map and the pose of the start arrive before the goal is accepted.
+rospy.wait_for_message("map", OccupancyGrid)
+rospy.wait_for_message("initialpose", PoseWithCovarianceStamped)
+rospy.Subscriber("move_base_simple/goal", PoseStamped, on_goal)
+rospy.Subscriber("scan", LaserScan, on_scan)
+rospy.spin()
+"""
+LAUNCH = """
+<launch>
+  <arg name="mode"/>
+  <node name="driver" pkg="stack" type="node" args="$(arg mode)" required="true"/>
+</launch>
+"""
+PACKAGE = """
+<package format="2">
+  <name>stack</name><version>0.0.0</version><description>A driver.</description>
+  <maintainer email="test@example.com">Test</maintainer><license>BSD</license>
+</package>
+"""
+TEXT = "goals: [[4, 5], [4, 7]]\nlimits: {time: 30}\nrequire: [reached, no contact]\n"
+
+
+@pytest.fixture
+def drive(scenario, room, monkeypatch):
+    """Runs a scenario with the node in several modes in worker processes; returns the rows."""
+    package = room / "stack"
+    package.mkdir()
+    (package / "package.xml").write_text(PACKAGE)
+    (package / "node").write_text(f"#!{sys.executable}\n{NODE}")
+    (package / "node").chmod(0o755)
+    (room / "stack.launch").write_text(LAUNCH)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{package}:{os.environ['ROS_PACKAGE_PATH']}")
+
+    def drive(*controllers, text=TEXT, **options):
+        names = [
+            name if "." in name else f"command: {package / 'node'} {name}" for name in controllers
+        ]
+        runs = runs_of([scenario(text)], names, [1])
+        stack = StackOptions(**options)
+        found = run_in_processes(
+            runs, Options(str(room), str(room / "out"), "none", stack), WorkerLimits(), 2
+        )
+        rows = {result.row["controller"]: result.row for result in found}
+        assert not processes_of(package)
+        return [rows[name] for name in names]
+
+    return drive
+
+
+def processes_of(folder: Path) -> list[str]:
+    """Returns the commands of all processes that run a program in a folder, or the sleeper."""
+    commands = []
+    for file in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            command = file.read_bytes().replace(b"\0", b" ").decode()
+        except OSError:
+            continue
+        if f"{folder}/" in command or "4321.5" in command:
+            commands.append(command)
+    return commands
+
+
+def test_a_launch_file_and_a_program_drive_to_all_goals(drive):
+    for row in drive("stack.launch mode:=drive", "leaves"):
+        assert (row["outcome"], row["passed"], row["goals"]) == ("reached", True, 2), row["error"]
+        assert row["path_length"] == pytest.approx(3.6, abs=0.3)
+        # 3.6 m at 0.5 m/s, and the turn by 90 degrees.
+        assert 7 < row["time"] < 15
+        # The simulator sends the localisation.
+        assert row["localization_error"] < 0.01
+        assert row["command_time"] > 0
+
+
+def test_the_error_of_the_localization_is_measured(drive):
+    (row,) = drive("localizes", localization="stack")
+    assert row["localization_error"] == pytest.approx(0.2, abs=0.01)
+    assert row["max_localization_error"] == pytest.approx(0.2, abs=0.02)
+    # The robot stops short of the goal by that distance, within the tolerance.
+    assert row["outcome"] == "reached"
+
+
+def test_a_stack_that_fails_is_a_failed_run(drive):
+    modes = ["stack.launch mode:=ends", "ends", "absent", "nan", "floods", "silent", "kills"]
+    rows = dict(zip(modes, drive(*modes), strict=True))
+    assert {row["outcome"] for row in rows.values()} == {"error"}
+    errors = {mode: row["error"] for mode, row in rows.items()}
+    assert "the program has ended" in errors["stack.launch mode:=ends"]
+    assert "the program has ended with exit code 0" in errors["ends"]
+    assert "its last output: " in errors["ends"]
+    assert "the battery is empty" in errors["ends"]
+    assert "\033" not in errors["ends"]
+    assert "the program has ended with exit code 4; its last output: no battery" in errors["absent"]
+    assert "a command that is not finite" in errors["nan"]
+    assert "sent more than 200 commands per second" in errors["floods"]
+    assert "sent no command for 10 s" in errors["silent"]
+    # The node ends the worker process, and is ended with it.
+    assert "ended in each of 3 attempts (signal 9)" in errors["kills"]
+
+
+def test_a_stack_that_is_not_ready_in_time_is_a_failed_run(drive):
+    (row,) = drive("drive", goal_topic="elsewhere", start_time=2.0)
+    assert row["outcome"] == "error"
+    assert "not ready after 2 s: no node subscribes to /elsewhere" in row["error"]
+
+
+def test_real_time_that_is_not_held_makes_a_run_invalid(drive, room):
+    (row,) = drive("drive", pace="real-time")
+    assert (row["outcome"], row["passed"]) == ("reached", True), row["error"]
+    assert row["real_time_factor"] < 1.1
+    # A step with so many beams takes longer than 5 ms.
+    model = room / "robot.model.yaml"
+    text = model.read_text().replace("increment: 0.05", "increment: 0.00002")
+    model.write_text(text.replace("update_rate: 10\n", "update_rate: 200\n"))
+    (row,) = drive("drive", text=TEXT.replace("time: 30", "time: 2"), pace="real-time")
+    assert (row["outcome"], row["success"], row["passed"]) == ("invalid", False, False)
+    assert "did not hold real time" in row["failures"]
+
+
+def test_the_name_of_a_stack_is_checked(room):
+    for name, message in (
+        ("command:", "expected a program"),
+        ("command: a 'b", "No closing quotation"),
+        ("missing.launch a:=1", "file not found"),
+    ):
+        with pytest.raises(ControllerError, match=message):
+            find_controller(name, str(room))
+
+
+def test_a_program_ends_with_all_its_processes(tmp_path):
+    marker = math.pi * 1e6
+    script = f"setsid sleep {marker} & trap '' TERM; echo started; sleep {marker}"
+    program = Program([shutil.which("bash") or "bash", "-c", script], {}, str(tmp_path))
+    while not program.last_lines:
+        assert program.exit_code is None
+    program.end()
+    assert program.last_lines == "started"
+    commands = b"".join(file.read_bytes() for file in Path("/proc").glob("[0-9]*/cmdline"))
+    assert str(marker).encode() not in commands
