@@ -20,7 +20,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
 
 import flatland
-from flatland.gym import FlatlandVectorEnv, RandomGoal, make_vec
+from flatland.gym import FlatlandVectorEnv
 from flatland.gym.stable_baselines import StableVector
 
 FOLDER = Path(evaluate.__file__).resolve().parent
@@ -147,17 +147,3 @@ def test_the_policy_does_over_ros_what_it_does_in_python(policy: Path) -> None:
     # arrive a step late: some episodes end differently.
     agreeing = sum(one[0] == other[0] for one, other in zip(in_python, over_ros, strict=True))
     assert agreeing >= 0.7 * EPISODES
-
-
-def test_a_callback_may_change_the_task() -> None:
-    envs = StableVector(make_vec("flatland/Corridor-v0", 2, autoreset_mode="SameStep"))
-    task = RandomGoal((4.0, 6.0))
-    envs.set_attr("task", task)
-    assert envs.get_attr("task") == [task, task]
-    envs.seed(0)
-    envs.reset()
-    assert (envs.envs.episodes.situation.distance >= 4.0).all()
-    for name, indices in (("task", [0]), ("goals", None)):
-        with pytest.raises(AttributeError, match="share"):
-            envs.set_attr(name, task, indices)
-    envs.close()
