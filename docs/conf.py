@@ -107,7 +107,7 @@ nitpick_ignore_regex = [
     # Names that are imported only for type checkers, or are not described.
     (
         r"py:class",
-        r"(Episodes|FleetEnv|Laser|Outline|Path|PluginWorld|ReadYaml|Row|Touches|Update)",
+        r"(Episodes|FleetEnv|Laser|Outline|Path|PluginWorld|ReadYaml|Rows?|Touches|Update)",
     ),
     (r"py:class", r"flatland\.web\.foreign_topics\.ForeignTopics"),
     (r"py:class", r"flatland\._core\..*"),

@@ -230,9 +230,7 @@ class SteeringAction(_ContinuousAction):
 class DiscreteAction(Action):
     """The index of one of several commands, such as for deep Q-learning."""
 
-    def __init__(
-        self, commands: Sequence[Sequence[float]], kind: _ContinuousAction | None = None
-    ) -> None:
+    def __init__(self, commands: Sequence[Sequence[float]], kind: Action | None = None) -> None:
         """Creates the action.
 
         Args:

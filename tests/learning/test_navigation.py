@@ -25,7 +25,7 @@ from teacher import Teacher
 from train_navigate import Training
 
 import flatland
-from flatland.gym import FlatlandEnv, FlatlandVectorEnv, RandomGoal, make_vec
+from flatland.gym import FlatlandEnv, FlatlandVectorEnv
 from flatland.gym import evaluate as rates_of
 from flatland.gym.policies import INCLUDED, Policy
 from flatland.gym.stable_baselines import StableVector
@@ -271,17 +271,3 @@ def test_the_policy_does_over_ros_what_it_does_in_python(monkeypatch: pytest.Mon
         # A command may arrive a step late, so that single episodes end differently.
         assert sum(success for success, _ in outcomes) >= EPISODES - 1
         assert not any(touched for _, touched in outcomes)
-
-
-def test_a_callback_may_change_the_task() -> None:
-    envs = StableVector(make_vec("flatland/Corridor-v0", 2, autoreset_mode="SameStep"))
-    task = RandomGoal((4.0, 6.0))
-    envs.set_attr("task", task)
-    assert envs.get_attr("task") == [task, task]
-    envs.seed(0)
-    envs.reset()
-    assert (envs.envs.episodes.situation.distance >= 4.0).all()
-    for name, indices in (("task", [0]), ("goals", None)):
-        with pytest.raises(AttributeError, match="share"):
-            envs.set_attr(name, task, indices)
-    envs.close()

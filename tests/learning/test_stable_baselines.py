@@ -1,4 +1,4 @@
-"""Environments with other spaces, with the checker and the algorithms of stable-baselines3."""
+"""Environments of all kinds with the checker and the algorithms of stable-baselines3."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from flatland.gym import (
     Goal,
     LocalMap,
     Observation,
+    RandomGoal,
     Stacked,
     make_vec,
 )
@@ -71,4 +72,18 @@ def test_robots_of_fleets_learn_together() -> None:
     lengths = [episode["l"] for episode in model.ep_info_buffer]
     assert len(lengths) > 6
     assert max(lengths) <= 8
+    envs.close()
+
+
+def test_a_callback_may_change_the_task() -> None:
+    envs = StableVector(make_vec("flatland/Corridor-v0", 2, autoreset_mode="SameStep"))
+    task = RandomGoal((4.0, 6.0))
+    envs.set_attr("task", task)
+    assert envs.get_attr("task") == [task, task]
+    envs.seed(0)
+    envs.reset()
+    assert (envs.envs.episodes.situation.distance >= 4.0).all()
+    for name, indices in (("task", [0]), ("goals", None)):
+        with pytest.raises(AttributeError, match="share"):
+            envs.set_attr(name, task, indices)
     envs.close()
