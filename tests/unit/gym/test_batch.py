@@ -60,6 +60,15 @@ def create(make: Make, world: str | Path) -> Any:
     )
 
 
+def begun(make: Make, room: Path) -> tuple[Any, Any, Any]:
+    """Returns environments after the first updates of plugins, commands, and who acts."""
+    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
+    env.reset(seed=0)
+    for _ in range(2):
+        env.step(np.full((COUNT, 2), 0.1))
+    return env, np.tile([0.1, 0.0, 0.1], (COUNT, 1)), np.ones(COUNT, np.bool_)
+
+
 @pytest.mark.parametrize("world", ["room", "corridor"])
 def test_an_observer_does_not_change_results(make: Make, room: Path, world: str) -> None:
     env = create(make, room if world == "room" else world)
@@ -111,11 +120,7 @@ def test_an_exception_of_one_world_ends_the_steps_of_all(make: Make, room: Path)
 def test_the_core_performs_all_steps_alone_after_those_with_first_updates(
     make: Make, room: Path
 ) -> None:
-    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
-    env.reset(seed=0)
-    commands, ones = np.tile([0.1, 0.0, 0.1], (COUNT, 1)), np.ones(COUNT, np.bool_)
-    for _ in range(2):
-        env.step(np.full((COUNT, 2), 0.1))
+    env, commands, ones = begun(make, room)
     batch = env._episodes._batch
     assert batch.perform(commands, ones, 20, lambda: None).tolist() == []
     env._stage.worlds[1].add_observer(Watcher())
@@ -164,11 +169,7 @@ def test_a_command_has_the_last_value_of_the_core(make: Make, room: Path) -> Non
 def test_changes_from_outside_end_the_permission_of_the_core(
     make: Make, room: Path, change: str
 ) -> None:
-    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
-    env.reset(seed=0)
-    actions, ones = np.full((COUNT, 2), 0.1), np.ones(COUNT, np.bool_)
-    for _ in range(2):
-        env.step(actions)
+    env, commands, ones = begun(make, room)
     world = env.worlds[1]
     values: list[Twist] = []
     if change == "on_set":
@@ -179,7 +180,7 @@ def test_changes_from_outside_end_the_permission_of_the_core(
         world.physics.pre_solve = lambda *_: None
     else:
         world.pause()
-    batch, commands = env._episodes._batch, np.zeros((COUNT, 3))
+    batch = env._episodes._batch
     for count in (1, 2):
         assert batch.perform(commands, ones, 20, lambda: None).tolist() == [1]
         assert len(values) == (count if change == "on_set" else 0)
