@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from flatland.gym.controllers import Gap, Perception
+from flatland import controllers
+from flatland.gym.controllers import Gap
 
 if TYPE_CHECKING:
     from flatland.geometry import DoubleArray, Vector2
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from flatland.physics import Crowd
     from flatland.world import World
 
+_DISTANCE: Final = 1.0  # m, free distance that a heading needs
 _SPACING: Final = 0.2  # m, of the points on the way
 _AHEAD: Final = 4  # number of points to the place ahead
 _CELL: Final = 0.1  # m, of the grid on which ways are planned
@@ -81,6 +83,7 @@ class Teacher(Gap):
     def __init__(self, envs: FlatlandVectorEnv) -> None:
         """Creates the teacher for environments whose world is a collection of buildings."""
         super().__init__(envs)
+        self._gap = controllers.Gap(self.robot, distance=_DISTANCE)
         self._envs = envs
         self._ways: dict[str, _Ways] = {}
 
@@ -93,12 +96,14 @@ class Teacher(Gap):
         p = self._perceive(observations)
         targets = self._targets()
         headings: DoubleArray = np.arctan2(targets[:, 1], targets[:, 0])
-        free = self._free(p, headings[:, np.newaxis])[:, 0]
+        free = self._gap.free(p, headings[:, np.newaxis])[:, 0]
         # Only few robots need the other headings, whose computation takes most of the time.
-        blocked = free < np.minimum(np.hypot(*targets.T), self.distance)
+        blocked = free < np.minimum(np.hypot(*targets.T), self._gap.distance)
         if blocked.any():
-            rest = Perception(p.points[blocked], p.is_hit[blocked], targets[blocked], None)
-            headings[blocked] = self._best(rest)[0]
+            rest = controllers.Perception(
+                p.points[blocked], p.is_hit[blocked], targets[blocked], p.max_range
+            )
+            headings[blocked] = self._gap.best(rest)[0]
         return headings
 
     def _targets(self) -> DoubleArray:
@@ -122,7 +127,7 @@ class Teacher(Gap):
             agent = self._envs.episodes.agents[0]
             # A world of its own, since those of the environments return to their start.
             own = buildings.load(buildings.worlds.index(name), None, settings.step_size)
-            self._ways[name] = _Ways(own, agent.bits, self.radius + self.margin)
+            self._ways[name] = _Ways(own, agent.bits, agent.radius + self._gap.margin)
         return self._ways[name]
 
     def close(self) -> None:

@@ -90,7 +90,7 @@ class Gap(Controller):
         goals = perception.goals
         bearings = np.arctan2(goals[:, 1], goals[:, 0])
         headings = np.column_stack((np.tile(self._headings, (len(goals), 1)), bearings))
-        free = self._free(perception, headings)
+        free = self.free(perception, headings)
         # Of headings with equal angles, the one that needs least turning.
         cost = _angles(headings, bearings) + 0.1 * np.abs(headings)
         if before is not None:
@@ -106,8 +106,13 @@ class Gap(Controller):
         ahead = free[:, _HEADINGS // 2]
         return headings[rows, best], np.minimum(free[rows, best], ahead)
 
-    def _free(self, perception: Perception, headings: DoubleArray) -> DoubleArray:
-        """Returns how far each robot can drive along headings [m], shape (n, headings)."""
+    def free(self, perception: Perception, headings: DoubleArray) -> DoubleArray:
+        """Returns how far each robot can drive along headings [m].
+
+        Args:
+            perception: What the robots perceive.
+            headings: Headings in the frames of the robots [rad], shape (n, headings).
+        """
         ahead, left = perception.points[..., 0], perception.points[..., 1]
         reach = self.robot.radius + self.margin
         gaps = np.hypot(ahead, left)
