@@ -204,10 +204,12 @@ def draw_curves(curves: dict[int, Sequence[Row]], path: Path) -> None:
     axes = figure.add_subplot()
     for seed, rows in curves.items():
         columns = np.array(rows).T
-        (line,) = axes.plot(columns[1] / 1000, columns[2], label=f"seed {seed}")
+        (line,) = axes.plot(columns[1] / 1000, 1.0 - columns[2], label=f"seed {seed}")
         axes.plot(columns[1] / 1000, columns[3], ":", color=line.get_color())
-    axes.set(xlabel="thousand steps", ylim=(0, 1))
-    axes.set_ylabel(f"fraction of the last {WINDOW} episodes\n(goal reached; dotted: collision)")
+    axes.set(xlabel="thousand steps", ylim=(0, 0.1))
+    axes.set_ylabel(
+        f"fraction of the last {WINDOW} episodes\n(goal not reached; dotted: collision)"
+    )
     axes.grid(alpha=0.3)
     axes.legend()
     figure.savefig(path)
