@@ -13,7 +13,7 @@ simulator first:
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -71,19 +71,20 @@ def run_over_ros(policy: Policy, count: int) -> list[Outcome]:
     return outcomes
 
 
-def print_table(file: Path | None, count: int) -> None:
+def print_table(file: Path | None, count: int, tasks: Iterable[str] = TASKS) -> None:
     """Runs the same episodes with all controllers and a policy, and prints their rates.
 
     Args:
         file: File of the policy, None for the included one.
         count: Number of episodes; fewer among people.
+        tasks: What they are compared on, keys of `TASKS`.
     """
     makers: dict[str, Callable[[Any], Callable[[Any], Any]]] = {
         **CONTROLLERS,
         "policy": lambda envs: Policy(file, envs),
     }
     print("task                  controller   goal   coll.  other  steps to the goal")
-    for task in TASKS:
+    for task in tasks:
         for name, make in makers.items():
             print(f"{task:20s}  {name:10s} {rates(evaluate_on(task, make, count))}", flush=True)
 

@@ -93,9 +93,10 @@ def evaluate_on(
         episodes: Number of episodes, before the division in `TASKS`.
     """
     make_envs, divisor = TASKS[task]
-    envs = make_envs(64)
+    count = max(1, episodes // divisor)
+    envs = make_envs(min(count, 64))
     try:
-        return evaluate(make(envs), envs, max(1, episodes // divisor), EVALUATION_SEED)
+        return evaluate(make(envs), envs, count, EVALUATION_SEED)
     finally:
         envs.close()
 

@@ -30,7 +30,7 @@ from teacher import Teacher
 from torch import Tensor
 from torch.nn import functional
 
-from flatland.gym import FlatlandVectorEnv
+from flatland.gym import Buildings, FlatlandVectorEnv
 from flatland.gym.policies import Policy, PolicyRobot
 
 STEPS: Final = 64  # of each environment in a round
@@ -52,17 +52,18 @@ class Training:
             in the last episodes, and loss.
     """
 
-    def __init__(self, seed: int, rounds: int, num_envs: int) -> None:
+    def __init__(self, seed: int, rounds: int, num_envs: int, buildings: Buildings) -> None:
         """Creates a network with random weights.
 
         Args:
             seed: Seed of the episodes, the weights and the updates.
             rounds: Number of rounds.
             num_envs: Number of environments.
+            buildings: The buildings in which the episodes take place.
         """
         self._start = time.process_time()
         torch.manual_seed(seed)
-        self._envs = FlatlandVectorEnv(num_envs, TrainingBuildings(), autoreset_mode="SameStep")
+        self._envs = FlatlandVectorEnv(num_envs, buildings, autoreset_mode="SameStep")
         self._teacher = Teacher(self._envs)
         self.network = Network(self._envs)
         self._optimizer = torch.optim.Adam(self.network.parameters(), lr=LEARNING_RATE)
@@ -203,10 +204,12 @@ def draw_curves(curves: dict[int, Sequence[Row]], path: Path) -> None:
     axes = figure.add_subplot()
     for seed, rows in curves.items():
         columns = np.array(rows).T
-        (line,) = axes.plot(columns[1] / 1000, columns[2], label=f"seed {seed}")
+        (line,) = axes.plot(columns[1] / 1000, 1.0 - columns[2], label=f"seed {seed}")
         axes.plot(columns[1] / 1000, columns[3], ":", color=line.get_color())
-    axes.set(xlabel="thousand steps", ylim=(0, 1))
-    axes.set_ylabel(f"fraction of the last {WINDOW} episodes\n(goal reached; dotted: collision)")
+    axes.set(xlabel="thousand steps", ylim=(0, 0.1))
+    axes.set_ylabel(
+        f"fraction of the last {WINDOW} episodes\n(goal not reached; dotted: collision)"
+    )
     axes.grid(alpha=0.3)
     axes.legend()
     figure.savefig(path)
@@ -235,7 +238,7 @@ def main() -> None:
     table = ["seed  CPU min  task                  goal   coll.  other  steps to the goal"]
     for seed in options.seed:
         path = output.with_stem(f"{output.stem}-{seed}") if len(options.seed) > 1 else output
-        training = Training(seed, options.rounds, options.num_envs)
+        training = Training(seed, options.rounds, options.num_envs, TrainingBuildings())
         training.run()
         training.write(path)
         curves[seed] = training.curve
