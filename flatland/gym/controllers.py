@@ -47,8 +47,8 @@ class Controller:
                 `flatland.controllers`.
 
         Raises:
-            ValueError: The observation lacks a part, the action is no `VelocityAction`, or an option
-                is out of range.
+            ValueError: The observation lacks a part, the action is no `VelocityAction`, or an
+                option is out of range.
         """
         inner: Any = env.unwrapped
         episodes = inner.episodes
