@@ -192,7 +192,7 @@ def test_real_time_that_is_not_held_makes_a_run_invalid(drive, room):
     assert row["real_time_factor"] < 1.1
     # A step with so many beams takes longer than 5 ms.
     model = room / "robot.model.yaml"
-    text = model.read_text().replace("increment: 0.05", "increment: 0.00002")
+    text = model.read_text().replace("increment: 0.05", "increment: 0.000007")
     model.write_text(text.replace("update_rate: 10\n", "update_rate: 200\n"))
     (row,) = drive("drive", text=TEXT.replace("time: 30", "time: 2"), pace="real-time")
     assert (row["outcome"], row["success"], row["passed"]) == ("invalid", False, False)
