@@ -47,6 +47,7 @@ class Batch:
         self._core = AgentBatch([_core_of(agent) for agent in agents])
         # One thread at a time uses the worlds, and holds the lock of all of them.
         self._requests = agents[0].world.requests
+        self._all = np.ones(n, np.bool_)
         self._commands = np.zeros((n, 3))
         self._counts = np.zeros(n, np.int64)  # of commands of each agent
         self._noises = np.zeros((n, 2), np.uint64)  # see `Laser.next_computed`
@@ -86,14 +87,18 @@ class Batch:
         )
 
     def perform(
-        self, commands: DoubleArray, acting: BoolArray, n: int, meanwhile: Callable[[], object]
+        self,
+        commands: DoubleArray,
+        acting: BoolArray | None,
+        n: int,
+        meanwhile: Callable[[], object],
     ) -> Rows:
         """Carries out commands for some steps of the worlds, and observes all agents.
 
         Args:
             commands: Forward and sideways velocity and yaw rate of each agent, or speed, 0 and
                 steering angle [m/s, rad/s, rad], shape (n, 3).
-            acting: Agents that act, shape (n,); the worlds of others are not stepped.
+            acting: Agents that act, shape (n,); None for all. The worlds of others are not stepped.
             n: Number of steps.
             meanwhile: Called while other threads step; it may change the worlds of agents that do
                 not act, and replace these agents. They are observed afterwards.
@@ -109,17 +114,22 @@ class Batch:
         with self._requests.lock:
             others = [
                 row
-                for row in self._core.not_permitted(acting)
+                for row in self._core.not_permitted(self._all if acting is None else acting)
                 if not (is_free and self._permit(row))
             ]
-            alone = acting.copy()
-            alone[others] = False
+            alone = self._all if acting is None else acting
+            if others:
+                alone = alone.copy()
+                alone[others] = False
             self._start(commands, alone, alone, n)
             try:
                 meanwhile()
             finally:
                 unfinished = self._finish(alone)
-                np.copyto(self._commands, commands, where=alone[:, np.newaxis])
+                if alone is self._all:
+                    self._commands[:] = commands
+                else:
+                    self._commands[alone] = commands[alone]
                 self._counts += alone
                 self._complete(unfinished, n)
         if others:
@@ -127,7 +137,7 @@ class Batch:
             step_agents(agents, commands[others], n, self._num_threads)
         for row in (*others, *unfinished):
             self._situation.collided[row] = self._agents[row].touches.touched
-        idle = [] if acting.all() else np.flatnonzero(~acting).tolist()
+        idle = [] if acting is None else np.flatnonzero(~acting).tolist()
         return self._observe([*unfinished, *idle], others)
 
     def _observe(self, rows: Sequence[int], others: Sequence[int]) -> Rows:
