@@ -109,6 +109,8 @@ nitpick_ignore_regex = [
         r"py:class",
         r"(Episodes|FleetEnv|Laser|Outline|Path|PluginWorld|ReadYaml|Rows?|Touches|Update)",
     ),
+    (r"py:class", r"flatland\.(plugin_api\.ports\.CommandSource|timekeeper\.SimulatedTime)"),
+    (r"py:exc", "MissingPackageError"),
     (r"py:class", r"flatland\.web\.foreign_topics\.ForeignTopics"),
     (r"py:class", r"flatland\._core\..*"),
     # Type variables.

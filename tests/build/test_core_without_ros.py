@@ -10,7 +10,10 @@ from programs import run_program
 CHECK = """
 import importlib, pkgutil, sys
 
-WITH_ROS = {"flatland.ros", "flatland.ros2", "flatland.viewer", "flatland.msg", "flatland.srv"}
+WITH_ROS = {
+    "flatland.ros", "flatland.ros2", "flatland.viewer", "flatland.msg", "flatland.srv",
+    "flatland.scenarios.ros1",
+}
 # Raises an error that names the extra.
 WITH_EXTRA = {"flatland.gym.stable_baselines"}
 BLOCKED = {

@@ -194,11 +194,13 @@ def test_killed_subscriber_leaves_nothing_behind(
         # The first one has lasting effects: connections of XML-RPC that are kept for later calls.
         _kill_subscriber(node, launcher, program)
         before = node.settled()
-        _kill_subscriber(node, launcher, program)
+        for _ in range(2):
+            _kill_subscriber(node, launcher, program)
 
         def is_as_before() -> bool:
-            assert node.files() <= before[0], node.open_files()
-            assert node.status("Threads") <= before[1]
+            # Calls at the same time may keep one connection more than before; a leak is two.
+            assert node.files() <= before[0] + 1, node.open_files()
+            assert node.status("Threads") <= before[1] + 1
             return True
 
         wait_until("files and threads as before", is_as_before)
