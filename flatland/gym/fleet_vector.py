@@ -4,25 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
-from gymnasium.vector.utils import batch_space
 
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray
 from flatland.gym.checks import checked_count
-from flatland.gym.env import FlatlandEnv
 from flatland.gym.robots import begin_together, fleet_settings, spawn_robots, stop
-from flatland.gym.stage import Stage
-from flatland.gym.staged import StagedVector
+from flatland.gym.staged_vector import StagedVector
 from flatland.gym.vector import checked_mask, checked_seeds, masked_infos
-
-if TYPE_CHECKING:
-    pass
 
 
 class FleetVectorEnv(StagedVector):
@@ -36,8 +30,6 @@ class FleetVectorEnv(StagedVector):
     actions, its observation is blank (zeros), its reward is 0, and it is not terminated again. The
     info `is_active` is whether an action was carried out.
     """
-
-    kept_attributes = ("spec", "_rngs", "_seeds")
 
     def __init__(
         self,
@@ -77,34 +69,20 @@ class FleetVectorEnv(StagedVector):
             ValueError: An argument is out of range.
         """
         super().__init__()
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.num_worlds = checked_count("num_envs", num_envs)
         self.num_robots = checked_count("num_robots", num_robots)
-        num_threads = checked_count("num_threads", num_threads, 0)
         settings = fleet_settings(world, arguments)
-        if max_episode_steps is not None:
-            settings = settings.limited_to(checked_count("max_episode_steps", max_episode_steps))
         names = [f"robot_{number}" for number in range(self.num_robots)]
-        self._stage = Stage(
+        self._enter(
             settings,
-            [f"{settings.world_name} {number}" for number in range(self.num_worlds)],
+            self.num_worlds,
             lambda world: spawn_robots(world, names, robot, settings),
+            autoreset_mode=autoreset_mode,
+            num_threads=num_threads,
             render_mode=render_mode,
             web_port=web_port,
-            metadata={**FlatlandEnv.metadata, "autoreset_mode": self.autoreset_mode},
-            num_threads=num_threads,
+            max_episode_steps=max_episode_steps,
         )
-        self.render_mode = render_mode
-        self.metadata = self._stage.metadata
-        self.num_envs = self.num_worlds * self.num_robots
-        self._episodes = self._stage.episodes
-        self.single_action_space = settings.action.space
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.single_observation_space = self._episodes.layout.space
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self._rngs: list[np.random.Generator | None] = [None] * self.num_worlds
-        self._seeds: list[int | None] = [None] * self.num_worlds
-        self._has_begun = np.zeros(self.num_worlds, np.bool_)
         self._is_running = np.zeros(self.num_envs, np.bool_)
 
     @property  # type: ignore[misc]
@@ -213,13 +191,6 @@ class FleetVectorEnv(StagedVector):
         infos.update({"is_active": active, "_is_active": everyone})
         self._stage.show()
         return self._present(shown), rewards, terminated, truncated, infos
-
-    def _rng(self, number: int) -> np.random.Generator:
-        rng = self._rngs[number]
-        if rng is None:
-            rng, self._seeds[number] = seeding.np_random()
-            self._rngs[number] = rng
-        return rng
 
     def _worlds_that_are_over(self) -> list[int]:
         running = self._is_running.reshape(self.num_worlds, self.num_robots)

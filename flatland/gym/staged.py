@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from gymnasium.vector import VectorEnv
-
-from flatland.geometry import DoubleArray
 from flatland.gym.recreation import Recreated
 
 if TYPE_CHECKING:
     from flatland.gym.episodes import Episodes
-    from flatland.gym.stage import Image, Stage
+    from flatland.gym.stage import Stage
     from flatland.gym.tasks import Task
-    from flatland.world import World
 
 
 class Staged(Recreated):
@@ -39,42 +35,3 @@ class Staged(Recreated):
     def episodes(self) -> Episodes:
         """The episodes: agents, settings, and the layout of the observation."""
         return self._stage.episodes
-
-
-class StagedVector(Staged, VectorEnv[Any, Any, Any]):
-    """A vector of environments, one for each robot on a stage."""
-
-    @property
-    def worlds(self) -> tuple[World, ...]:
-        """The worlds, which must be stepped only by the vector.
-
-        With several buildings, each episode may be in another world.
-        """
-        return tuple(self._stage.worlds)
-
-    @property
-    def poses(self) -> DoubleArray:
-        """A copy of the poses (x, y, theta) of all robots in the world frame, shape (num_envs, 3).
-
-        They are those of the last observations [m, m, rad].
-        """
-        return self.episodes.situation.poses.copy()
-
-    @property
-    def goals(self) -> DoubleArray:
-        """A copy of all goals (x, y) in the world frame [m], shape (num_envs, 2)."""
-        return self.episodes.situation.goals.copy()
-
-    def render(self) -> tuple[Image, ...] | None:
-        """Returns an image of each world for `rgb_array`; for `human`, shows all worlds.
-
-        Raises:
-            ClosedEnvironmentError: The environments are closed.
-            FlatlandError: The viewer cannot listen on its port, or matplotlib is missing.
-        """
-        images = self._stage.render()
-        return None if images is None else tuple(images)
-
-    def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - as in the base class
-        """Closes all worlds and their views."""
-        self._stage.close()

@@ -10,16 +10,13 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
-from gymnasium.vector.utils import batch_space
 
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray
 from flatland.gym.checks import checked_count
-from flatland.gym.env import FlatlandEnv
 from flatland.gym.settings import Settings
 from flatland.gym.situation import Rows
-from flatland.gym.stage import Stage
-from flatland.gym.staged import StagedVector
+from flatland.gym.staged_vector import StagedVector
 from flatland.gym.tasks import Occupied
 
 if TYPE_CHECKING:
@@ -33,8 +30,6 @@ class FlatlandVectorEnv(StagedVector):
     Each environment gives the same numbers as a `FlatlandEnv` of the same seed, for any number of
     threads.
     """
-
-    kept_attributes = ("spec", "_rngs", "_seeds")
 
     def __init__(
         self,
@@ -74,34 +69,19 @@ class FlatlandVectorEnv(StagedVector):
             ValueError: An argument is out of range.
         """
         super().__init__()
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
-        num_envs = checked_count("num_envs", num_envs)
-        num_threads = checked_count("num_threads", num_threads, 0)
         settings = Settings.from_arguments({"world": world, **arguments})
-        if max_episode_steps is not None:
-            settings = settings.limited_to(checked_count("max_episode_steps", max_episode_steps))
-        self.single_action_space = settings.action.space
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self._stage = Stage(
+        self._enter(
             settings,
-            [f"{settings.world_name} {number}" for number in range(num_envs)],
+            checked_count("num_envs", num_envs),
             lambda world: [settings.find_agent(world)],
+            autoreset_mode=autoreset_mode,
+            num_threads=num_threads,
             render_mode=render_mode,
             web_port=web_port,
-            metadata={**FlatlandEnv.metadata, "autoreset_mode": self.autoreset_mode},
-            num_threads=num_threads,
+            max_episode_steps=max_episode_steps,
         )
-        self.render_mode = render_mode
-        self.metadata = self._stage.metadata
-        self.num_envs = num_envs
         self.copy = copy
-        self._episodes = self._stage.episodes
-        self.single_observation_space = self._episodes.layout.space
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._rngs: list[np.random.Generator | None] = [None] * num_envs
-        self._seeds: list[int | None] = [None] * num_envs
-        self._has_begun = np.zeros(num_envs, np.bool_)
-        self._has_ended = np.zeros(num_envs, np.bool_)
+        self._has_ended = np.zeros(self.num_envs, np.bool_)
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
@@ -201,13 +181,6 @@ class FlatlandVectorEnv(StagedVector):
         infos.update(masked_infos(self._episodes, np.ones(self.num_envs, np.bool_)))
         self._stage.show()
         return self._present(), rewards, terminated, truncated, infos
-
-    def _rng(self, row: int) -> np.random.Generator:
-        rng = self._rngs[row]
-        if rng is None:
-            rng, self._seeds[row] = seeding.np_random()
-            self._rngs[row] = rng
-        return rng
 
     def _begin(self, rows: Rows, places: Sequence[Mapping[str, Any]] = ()) -> None:
         """Begins episodes.
