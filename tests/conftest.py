@@ -34,7 +34,7 @@ _MARKED_FOLDERS = {"ros": "ros", "ros/viewer": "viewer", "build": "build", "web"
 _GROUPED_FOLDERS = ("build", "ros/viewer")
 _LISTED_GROUPS = 10
 # Folders with groups that take long; they start first, so that none is left alone at the end.
-_SLOW_FOLDERS = ("build", "ros/viewer", "web", "examples", "ros")
+_SLOW_FOLDERS = ("build", "ros/viewer", "web", "examples", "ros", "unit/scenarios")
 
 
 def _group_of(path: str) -> str:
