@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +17,6 @@ from flatland.gym.checks import checked_count
 from flatland.gym.robots import begin_together, fleet_settings, spawn_robots, stop
 from flatland.gym.stage import RENDER_MODES, Image, Stage
 from flatland.gym.staged import Staged
-
-if TYPE_CHECKING:
-    pass
 
 Steps = tuple[
     dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]

@@ -121,7 +121,7 @@ class RandomizationSum(Randomization):
             part.prepare(n, beams, size)
 
     def change_world(self, world: World, rng: np.random.Generator) -> None:
-        """Lets all parts change the world."""
+        """Calls `change_world` of all parts."""
         for part in self.parts:
             part.change_world(world, rng)
 
@@ -131,12 +131,12 @@ class RandomizationSum(Randomization):
             part.begin(row, agent, rng)
 
     def change_commands(self, commands: DoubleArray, situation: Situation, rows: Rows) -> None:
-        """Lets all parts change the commands."""
+        """Calls `change_commands` of all parts."""
         for part in self.parts:
             part.change_commands(commands, situation, rows)
 
     def change_scans(self, situation: Situation, rows: Rows) -> None:
-        """Lets all parts change the scans."""
+        """Calls `change_scans` of all parts."""
         for part in self.parts:
             part.change_scans(situation, rows)
 
