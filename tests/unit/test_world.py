@@ -43,6 +43,9 @@ class Probe(ModelPlugin):
     def begin_contact(self, contact):
         self._record("begin")
 
+    def pre_solve(self, contact, old_manifold):
+        self._record("pre_solve")
+
     def end_contact(self, contact):
         self._record("end")
 
@@ -180,9 +183,6 @@ def test_a_move_that_is_invalid_for_one_body_moves_no_body(files):
     assert [body.pose for body in model.bodies] == before
 
 
-NAN, INF = math.nan, math.inf
-
-
 def test_a_request_to_a_closing_world_fails(files):
     """A request that is made while the world is closing must not wait forever."""
     world = files.load("{properties: {}, layers: []}")
@@ -240,7 +240,7 @@ def test_delete_shuts_down_plugins_and_releases_everything(files, probe):
     assert [other.name for other in world.models] == ["a"]
 
 
-@pytest.mark.parametrize("hook", ["before", "after", "begin"])
+@pytest.mark.parametrize("hook", ["before", "after", "begin", "pre_solve"])
 def test_requests_of_a_hook_run_after_the_step(files, probe, hook):
     world = files.load("{properties: {}, layers: []}")
     world.spawn_model("probe.model.yaml", "a")
@@ -302,7 +302,9 @@ def test_a_closed_world_raises_and_may_be_closed_again(files, probe):
         lambda: world.spawn_model("minimal.model.yaml", "x"),
         lambda: world.move_model("a", (0, 0, 0)),
         lambda: world.delete_model("a"),
+        lambda: world.is_free((0, 0), radius=1),
         world.state,
+        world.state_hash,
     ):
         with pytest.raises(WorldError, match="the world is closed"):
             action()

@@ -19,13 +19,6 @@ def test_a_world_file_that_does_not_exist(tmp_path):
     assert str(caught.value).startswith(f'Flatland YAML: File does not exist, path="{path}"')
 
 
-def test_a_world_file_of_an_unknown_user_does_not_exist():
-    with pytest.raises(
-        YamlError, match=r'File does not exist, path=".*/~no-such-user/world\.yaml"'
-    ):
-        flatland.World.from_yaml("~no-such-user/world.yaml")
-
-
 @pytest.mark.parametrize(
     ("keys", "text"),
     [
@@ -57,13 +50,6 @@ def test_paths_in_included_files_are_relative_to_the_world_file(files, monkeypat
     assert world.model("m").path == str(files.folder / "minimal.model.yaml")
 
 
-def test_a_huge_number_of_layer_names_is_rejected_quickly(files):
-    """Duplicate names are found in linear time."""
-    names = [f"l{i}" for i in range(20_000)]
-    with pytest.raises(YamlError, match="Unable to add 20000 additional"):
-        files.load(f"{{properties: {{}}, layers: [{{name: [{', '.join(names)}]}}]}}")
-
-
 def test_world_plugins_of_one_type_can_have_different_names(files, caplog):
     caplog.set_level(logging.INFO, "flatland")
     world = files.load(
@@ -80,13 +66,6 @@ def test_default_properties(empty_world):
     assert empty_world.layers == []
     assert empty_world.models == []
     assert empty_world.time == 0.0
-
-
-def test_solver_iterations(files):
-    world = files.load(
-        "{properties: {velocity_iterations: 11, position_iterations: 12}, layers: []}"
-    )
-    assert (world.velocity_iterations, world.position_iterations) == (11, 12)
 
 
 def test_layer_that_is_published_as_a_map(files, empty_world):
@@ -245,11 +224,6 @@ def test_parameters_are_available_in_files(files):
         params={"/iterations": 7},
     )
     assert world.velocity_iterations == 7
-
-
-def test_a_map_of_a_topic_is_awaited(files, caplog):
-    files.load('{properties: {}, layers: [{name: [2d, 3d], map: "topic://map"}]}')
-    assert 'Layer "2d" is empty until a map is received from topic "map" or given' in caplog.text
 
 
 def test_expressions_depend_on_the_seed(files):

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import flatland
-from flatland.config.documents import load_documents
-from flatland.config.inputs import Inputs
 from flatland.errors import FlatlandError
-from flatland.loading import world_source
 from flatland.loading.world_source import WorldSource
 from flatland.scene.description import describe_body
 
@@ -91,29 +87,6 @@ def test_a_model_that_was_read_ahead_is_spawned_without_its_files(folder: Path) 
         )
         with pytest.raises(FlatlandError, match="does not exist"):
             world.spawn_model("m.yaml", "second")
-
-
-def test_a_file_is_read_ahead_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    loaded = []
-
-    def load(path: str, inputs: Inputs) -> Any:
-        loaded.append(Path(path).name)
-        return load_documents(path, inputs)
-
-    monkeypatch.setattr(world_source, "load_documents", load)
-    with flatland.World.from_yaml(folder / "world.yaml", seed=1) as world:
-        world.source.read_models_ahead(["m.yaml", "m.yaml"])
-    assert sorted(loaded) == ["m.yaml", "shape.yaml"]
-
-
-def test_a_text_that_was_read_ahead_is_not_parsed_again(folder: Path) -> None:
-    text = "{bodies: [{name: base, footprints: [$include shape.yaml]}]}"
-    with flatland.World.from_yaml(folder / "world.yaml", seed=1) as world:
-        store = world.source.read_models_ahead([text])
-        assert set(store.documents) == {text, str(folder / "shape.yaml")}
-        with world.source.inputs.using(store):
-            world.spawn_model(text, "r")
-        assert store.documents == {}
 
 
 @pytest.mark.parametrize("text", ["bodies: [", "bodies: $include missing.yaml", "{}"])

@@ -135,28 +135,6 @@ def test_an_empty_path_and_missing_folders_have_no_exports(search, monkeypatch):
     assert names(package_exports.package_exports()) == []
 
 
-@pytest.fixture
-def searches(monkeypatch):
-    """The searched package paths in order."""
-    searched = []
-    search = package_exports._search
-
-    def count(path):
-        searched.append(path)
-        return search(path)
-
-    monkeypatch.setattr(package_exports, "_search", count)
-    return searched
-
-
-def test_the_path_is_searched_once_without_changes(search, searches):
-    first = search({"a/package.xml": package("a", exported())})
-    assert package_exports.package_exports() is first
-    assert len(searches) == 1
-    search({"empty/x": ""}, ["empty"])
-    assert len(searches) == 2
-
-
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
@@ -168,16 +146,13 @@ def test_the_path_is_searched_once_without_changes(search, searches):
         (lambda folder: (folder / "a" / "CATKIN_IGNORE").touch(), []),
     ],
 )  # fmt: skip
-def test_a_change_of_a_folder_or_package_file_repeats_the_search(
-    search, searches, files, change, expected
-):
+def test_a_change_of_a_folder_or_package_file_repeats_the_search(search, files, change, expected):
     assert names(search({"a/package.xml": package("a", exported()), "b/x": ""})) == ["a"]
     change(files.folder)
     assert names(package_exports.package_exports()) == expected
-    assert len(searches) == 2
 
 
-def test_a_change_right_after_a_search_repeats_the_search(search, searches, files):
+def test_a_change_right_after_a_search_repeats_the_search(search, files):
     """With a coarse clock, the change may not affect the modification time of the folder."""
     search({"a/x": ""})
     (files.folder / "a" / "package.xml").write_text(package("a", exported()))
@@ -186,4 +161,3 @@ def test_a_change_right_after_a_search_repeats_the_search(search, searches, file
     (files.folder / "a" / "CATKIN_IGNORE").touch()
     os.utime(files.folder / "a", ns=(now, now))
     assert names(package_exports.package_exports()) == []
-    assert len(searches) == 3

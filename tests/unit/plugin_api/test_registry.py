@@ -28,6 +28,8 @@ MANIFEST = """
          base_class_type="flatland::ModelPlugin"/>
   <class name="{package}::Broken" type="{package}.broken.X"
          base_class_type="flatland::ModelPlugin"/>
+  <class name="{package}::Quits" type="{package}.quits.X"
+         base_class_type="flatland::ModelPlugin"/>
   <class name="{package}::Faulty" type="{package}.things.Faulty"
          base_class_type="flatland::ModelPlugin"/>
 </library>
@@ -58,6 +60,7 @@ def package(files, request, monkeypatch):
     files.write(f"src/{name}/__init__.py", "")
     files.write(f"src/{name}/things.py", THINGS)
     files.write(f"src/{name}/broken.py", "import no_such_module_anywhere")
+    files.write(f"src/{name}/quits.py", "import sys\nsys.exit('no licence')\n")
     manifest = files.write("plugins.xml", MANIFEST.format(package=name))
     monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
     monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
@@ -104,6 +107,7 @@ def test_the_name_defaults_to_the_type(package):
         ("NoModule", r'module "{0}.nowhere" of plugin "{0}::NoModule" .* cannot be imported: '
          r"ModuleNotFoundError: No module named '{0}.nowhere'"),
         ("Broken", r"cannot be imported: ModuleNotFoundError: No module named 'no_such_module"),
+        ("Quits", "cannot be imported: SystemExit: no licence"),
         ("NoClass", r'module "{0}.things" .* has no class "Absent"'),
         ("NoPlugin", r'"{0}.things.Plain" of plugin "{0}::NoPlugin" must be a class derived from '
          "flatland::ModelPlugin"),

@@ -100,14 +100,6 @@ def test_a_run_is_repeated_exactly(run: Path) -> None:
     assert kinds[-1] == "end"
 
 
-def test_the_steps_are_reported(run: Path) -> None:
-    result = Replay(run)
-    steps: list[int] = []
-    result.run(steps.append)
-    assert steps == list(range(1, 551))
-    result.close()
-
-
 def test_a_recording_does_not_change_the_run(world_files: Any) -> None:
     world = world_files.load(WORLD, params={"radius": 0.25})
     drive(world)
@@ -327,23 +319,6 @@ def test_a_full_disk_during_the_run_ends_the_recording_only(
     assert not recorder.is_open
     world.move_model("ball", (1, 1, 0))
     world.command("/cmd_vel").set(Twist(1.0))
-
-
-def test_random_numbers_of_files_derive_from_the_seed(world_files: Any) -> None:
-    world_files.write(
-        "ball.model.yaml",
-        BALL.replace('$eval param("radius", 0.2)', "$eval 0.1 + 0.1 * math.random()"),
-    )
-
-    def radii(seed: int) -> list[float]:
-        world = world_files.load(WORLD, seed=seed)
-        world.spawn_model("ball.model.yaml", "other", pose=(2, 2, 0))
-        return [model.bodies[0].fixtures[0].radius for model in world.models[1:]]
-
-    first = radii(1)
-    assert first[0] != first[1]
-    assert radii(1) == first
-    assert radii(2) != first
 
 
 def test_resets_and_snapshots_are_repeated(world_files: Any) -> None:

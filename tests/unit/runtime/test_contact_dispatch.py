@@ -68,11 +68,3 @@ def test_contacts_of_a_new_model_are_reported_although_another_one_is_deleted(ro
     world.delete_model("other")
     world.step()
     assert recorder.calls["begin_contact"] == [{"disc", "new"}]
-
-
-def test_without_plugins_the_core_calls_nothing_for_contacts(row: Any) -> None:
-    world = row(1)[0].world
-    assert world.physics.pre_solve is not None
-    world.delete_model("0")
-    world.step()
-    assert world.physics.pre_solve is None

@@ -285,10 +285,3 @@ class TestTopic:
             assert ahead(world) == pytest.approx(3, abs=1e-5)
             world.reset()
             assert world.state_hash() == first
-
-    @pytest.mark.parametrize("topic", ["topic://", "topic:///", "topic://my map", "topic://1st"])
-    def test_an_invalid_name_is_an_error(self, folder: Path, topic: str) -> None:
-        path = folder / "waiting.yaml"
-        path.write_text(path.read_text().replace("topic:///map", topic))
-        with pytest.raises(flatland.YamlError, match=r'Invalid "map", .*waiting\.yaml:2'):
-            flatland.World.from_yaml(path)

@@ -232,15 +232,6 @@ def test_bodies_without_a_model_block(world: flatland.World) -> None:
         spawn(world, "minimal", "m", (0, 3, 0), if_blocked="refuse")
 
 
-def test_an_unknown_value_of_if_blocked_raises(world: flatland.World) -> None:
-    text = "if_blocked must be one of allow, warn, refuse, nearest, got 'stop'"
-    with pytest.raises(ValueError, match=text):
-        spawn(world, "minimal", "m", (0, 0, 0), if_blocked="stop")
-    spawn(world, "minimal", "m", (0, 0, 0))
-    with pytest.raises(ValueError, match=text):
-        world.move_model("m", (0, 0, 0), if_blocked="stop")  # type: ignore[arg-type]
-
-
 def test_a_refused_request_of_a_hook_logs_one_error(
     world: flatland.World, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -275,9 +266,6 @@ def test_each_overlapping_model_of_a_world_file_is_logged_once(
         'model "a" overlaps layer "walls" at (5.000, 0.000, 0.000)',
         'model "b" overlaps layer "walls", model "a" at (5.000, 0.100, 0.000)',
     ]
-
-
-# -- included worlds and worlds of the reference ------------------------------------------------
 
 
 # -- is_free ------------------------------------------------------------------------------------
@@ -342,12 +330,6 @@ def test_invalid_arguments_of_is_free_raise(
     spawn(world, "minimal", "m", (0, 0, 0))
     with pytest.raises(error, match=text):
         world.is_free(pose, **options)
-
-
-def test_is_free_raises_in_a_closed_world(world: flatland.World) -> None:
-    world.close()
-    with pytest.raises(WorldError, match="the world is closed"):
-        world.is_free((0, 0), radius=1)
 
 
 # -- sample_free --------------------------------------------------------------------------------

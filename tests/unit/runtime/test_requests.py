@@ -29,15 +29,6 @@ def test_actions_run_in_order_of_arrival_and_later_ones_wait() -> None:
     assert done == [1, 2, 3]
 
 
-def test_an_exception_of_an_action_is_set_on_its_future() -> None:
-    requests = Requests()
-    failing = requests.post(lambda: 1 / 0)
-    good = requests.post(lambda: 7)
-    requests.process()
-    assert isinstance(failing.exception(timeout=0), ZeroDivisionError)
-    assert good.result(timeout=0) == 7
-
-
 def test_a_cancelled_action_does_not_run() -> None:
     requests, done = Requests(), []
     assert requests.post(lambda: done.append(1)).cancel()

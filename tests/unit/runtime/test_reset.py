@@ -311,13 +311,3 @@ def test_errors(world: World) -> None:
     world.close()
     with pytest.raises(WorldError, match="the world is closed"):
         world.reset()
-
-
-def test_a_snapshot_can_be_restored_after_a_reset(world: World) -> None:
-    world.step(10)
-    snapshot = world.snapshot()
-    expected = run(world)
-    world.reset(seed=5)
-    world.step(3)
-    world.restore(snapshot)
-    assert run(world) == expected

@@ -643,13 +643,3 @@ def test_a_clone_is_released(world: World) -> None:
     del clone
     gc.collect()
     assert reference() is None
-
-
-def test_noise_of_a_clone_is_that_of_the_original(world: World) -> None:
-    world.step(10)
-    laser: Any = world.model("drift").plugin("laser")
-    with world.clone() as clone:
-        copied: Any = clone.model("drift").plugin("laser")
-        assert copied.beam_ends is laser.beam_ends
-        for _ in range(3):
-            assert np.array_equal(copied.compute_ranges(), laser.compute_ranges(), equal_nan=True)

@@ -107,22 +107,6 @@ def test_the_seed_is_part_of_the_state(files: Any) -> None:
     assert files.load_model(ROBOT).state_hash() != files.load_model(ROBOT, seed=2).state_hash()
 
 
-def test_reading_the_world_does_not_change_the_hash(files: Any) -> None:
-    world = files.load_model(ROBOT)
-    before = world.state_hash()
-    world.output("/odometry/filtered").subscribe(lambda value: None)
-    assert world.contacts == []
-    assert world.is_free((1, 1), 0.1)
-    assert world.state_hash() == before
-
-
-def test_a_closed_world_has_no_hash(files: Any) -> None:
-    world = files.load_model(ROBOT)
-    world.close()
-    with pytest.raises(WorldError, match="the world is closed"):
-        world.state_hash()
-
-
 # -- the state of a plugin -----------------------------------------------------------------
 
 

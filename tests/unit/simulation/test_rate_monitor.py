@@ -102,17 +102,6 @@ def test_one_warning_names_the_most_expensive_plugins(
     )
 
 
-def test_types_are_listed_only_if_plugins_share_a_type(
-    fleet: Any, fake_time: Any, caplog: pytest.LogCaptureFixture
-) -> None:
-    run_fleet(fleet(3.5), fake_time, 10)
-    (text,) = warnings(caplog)
-    assert text.endswith(
-        'Model Plugin "laser" type "Laser" model "0" 87.5 %, '
-        'Model Plugin "drive" type "DiffDrive" model "0" 12.5 %'
-    )
-
-
 def test_the_warning_is_repeated_after_its_period_and_after_a_change_of_the_rate(
     fleet: Any, fake_time: Any, caplog: pytest.LogCaptureFixture
 ) -> None:

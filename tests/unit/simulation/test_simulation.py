@@ -133,17 +133,6 @@ def test_pause_and_resume_by_requests(world: flatland.World, counter: Counter) -
             counter.wait_for(steps + 3)
 
 
-def test_requests_run_in_order_in_the_thread_of_the_loop(world: flatland.World) -> None:
-    seen: list[int] = []
-    running = Running(Simulation(world, 200))
-    with running as simulation:
-        futures = [simulation.post(lambda i=i: seen.append(i)) for i in range(50)]  # type: ignore[misc]
-        ident = simulation.post(threading.get_ident).result(TIMEOUT)
-        assert all(future.done() for future in futures)
-    assert seen == list(range(50))
-    assert ident == running.thread.ident
-
-
 def test_request_does_not_wait_for_a_slow_cycle(world: flatland.World, counter: Counter) -> None:
     simulation = Simulation(world, 0.001)  # one step per 1000 s
     with Running(simulation):
