@@ -43,12 +43,6 @@ def test_a_body_has_the_pose_of_its_creation(world: PhysicsWorld) -> None:
     assert body.world is world
 
 
-def test_there_is_no_gravity(world: PhysicsWorld) -> None:
-    body = disc(world)
-    run(world, 100)
-    assert body.pose == (0, 0, 0)
-
-
 def test_mass_and_center_of_mass(world: PhysicsWorld) -> None:
     body = world.create_body("dynamic", (1, 0, math.pi / 2))
     body.create_polygon([(0, 0), (2, 0), (2, 1), (0, 1)], density=3)

@@ -175,24 +175,6 @@ def test_a_mirror_shows_objects_at_the_distance_of_their_image() -> None:
     assert scan.ranges[1] == pytest.approx(3 + 3 + 8, abs=1e-4)
 
 
-@pytest.mark.parametrize("first", [0.0, 0.3])
-def test_a_round_mirror_and_narrow_mirrors_reflect_single_beams(first: float) -> None:
-    world, sensor = room()
-    body = world.create_body("static", (4, 0, 0))
-    body.create_circle((0, 0), 1.0, density=0).material = MIRROR
-    # The normal at the hit of a beam at the angle a: |center - hit| = 1.
-    angle = first / 4
-    b = 4 * math.cos(angle)
-    distance = b - math.sqrt(b * b - 15)
-    hit = distance * np.array([math.cos(angle), math.sin(angle)])
-    normal = hit - [4, 0]
-    along = hit / distance
-    out = along - 2 * along.dot(normal) * normal
-    scales = [((8 if d > 0 else -8) - p) / d for p, d in zip(hit, out, strict=True) if d]
-    ranges = finder([angle]).scan(sensor, 1, 1).ranges
-    assert ranges[0] == pytest.approx(distance + min(s for s in scales if s > 0), rel=1e-4)
-
-
 def test_a_beam_is_reflected_only_once() -> None:
     world, sensor = room()
     add_edge(world, [3, -8, 3, 8], MIRROR)
@@ -317,16 +299,6 @@ def test_a_reflectance_of_minus_0_is_black() -> None:
     assert (scan.intensities == 0).all()
 
 
-def test_intensities_of_images_and_of_fixtures_without_material() -> None:
-    world, sensor = room()
-    add_edge(world, [3, -8, 3, 8], MIRROR)
-    angle = 0.1
-    scan = finder([angle] * 5).scan(sensor, 1, 1)
-    # The image of the wall behind the sensor is at x = 14; plain walls have a reflectance of 0.5.
-    expected = 255 * 0.5 * math.cos(angle) / (14 / math.cos(angle)) ** 2
-    assert scan.intensities == pytest.approx([expected] * 5, rel=1e-4)
-
-
 def test_intensities_are_bounded_near_the_sensor_and_0_without_a_hit() -> None:
     world = PhysicsWorld()
     sensor = world.create_body("static", (0, 0, 0))
@@ -352,15 +324,6 @@ def test_the_reflectance_layer_keeps_its_intensity() -> None:
 
 
 # -- what beams hit ---------------------------------------------------------------------------
-
-
-def test_labels_name_the_bodies_that_the_beams_hit() -> None:
-    world, sensor = room()
-    box = add_box(world, (3, 0, math.pi / 2), None)
-    scan = finder([0.0, 1.0, -0.05]).scan_labels(sensor, 1, 1)
-    bodies = [0 if label == 0 else scan.hits[label - 1][0] for label in scan.labels]
-    assert bodies == [box.id, WALL, box.id]
-    assert scan.ranges == pytest.approx(finder([0.0, 1.0, -0.05]).scan(sensor, 1, 1).ranges)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flatland.errors import StaleHandleError, WorldLockedError
+from flatland.errors import StaleHandleError
 from flatland.physics import ALL_BITS, PhysicsBody, PhysicsFixture, PhysicsWorld, Pose
 
 Points = npt.NDArray[np.float64]
@@ -311,30 +310,3 @@ def test_invalid_numbers_and_bodies_are_rejected() -> None:
     world.close()
     with pytest.raises(StaleHandleError):
         world.free_discs([(0, 0, 0)], 1, 1)
-
-
-def test_queries_in_other_threads_are_rejected_during_a_step() -> None:
-    world = PhysicsWorld()
-    first = disc(world, 0, 0, 1)
-    disc(world, 0.5, 0, 1)
-    errors: list[BaseException] = []
-
-    def query() -> None:
-        for call in (
-            lambda: world.free_discs([(0, 0, 0)], 1, 1),
-            lambda: world.overlapping_bodies([first], (0, 0, 0)),
-        ):
-            try:
-                call()
-            except WorldLockedError as error:
-                errors.append(error)
-
-    def hook(*_: object) -> None:
-        thread = threading.Thread(target=query)
-        thread.start()
-        thread.join()
-
-    world.pre_solve = hook
-    world.pre_solve_bodies = {first.id}
-    world.step(0.005, 1, 1)
-    assert len(errors) >= 2

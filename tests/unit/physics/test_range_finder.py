@@ -15,7 +15,7 @@ import numpy.typing as npt
 import pytest
 from programs import run_program
 
-from flatland.errors import StaleHandleError, WorldLockedError
+from flatland.errors import StaleHandleError
 from flatland.physics import (
     PhysicsBody,
     PhysicsWorld,
@@ -252,26 +252,6 @@ class TestManyScans:
         with pytest.raises(StaleHandleError):
             scan_all([ScanRequest(made, body, 0, 0), jobs[0]])
         other.step(0.01, 1, 1)  # is not locked
-
-    def test_a_stepping_world_is_locked(self) -> None:
-        world = PhysicsWorld()
-        bodies = [world.create_body("dynamic", (x, 0, 0)) for x in (0.0, 0.3)]
-        for body in bodies:
-            body.create_circle((0, 0), 0.2, density=1.0)
-        jobs = [ScanRequest(finder(fan(10)), bodies[0], 0, 0)] * 3
-        errors: list[BaseException] = []
-
-        def hook(*_: object) -> None:
-            for call in (lambda: scan_all(jobs), lambda: jobs[0].finder.scan(bodies[0], 0, 0)):
-                try:
-                    call()
-                except WorldLockedError as error:
-                    errors.append(error)
-
-        world.pre_solve, world.pre_solve_bodies = hook, {body.id for body in bodies}
-        world.step(0.01, 8, 3)
-        assert len(errors) >= 2
-        scan_all(jobs)
 
 
 @pytest.mark.parametrize(

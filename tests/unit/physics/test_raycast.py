@@ -98,15 +98,6 @@ def test_end_points_of_other_types_are_converted(world: PhysicsWorld) -> None:
         np.testing.assert_array_equal(world.cast_rays((0, 0, 0), same, ALL)[0], expected)
 
 
-def test_only_categories_in_the_mask_stop_rays(world: PhysicsWorld) -> None:
-    for x, category in ((1, 1), (2, 2), (3, 4)):
-        wall = world.create_body("static", (x, 0, 0))
-        wall.create_edges([[0, -1, 0, 1]], category_bits=category)
-    world.create_body("dynamic", (4, 0, 0)).create_circle((0, 0), 0.5, density=1, category_bits=8)
-    seen = [world.cast_rays((0, 0, 0), [[10, 0]], mask)[0][0] for mask in (7, 6, 4, 8, 16, 0)]
-    np.testing.assert_allclose(seen, [0.1, 0.2, 0.3, 0.35, np.nan, np.nan], rtol=1e-5)
-
-
 def test_sensors_stop_no_rays(world: PhysicsWorld) -> None:
     wall = world.create_body("static", (0, 0, 0))
     wall.create_edges([[1, -1, 1, 1], [2, -1, 2, 1]])
@@ -268,19 +259,6 @@ def test_a_ray_along_the_line_of_a_wall_has_no_hit_beside_the_wall(
     assert np.isnan(behind).all()
     # A ray along a wall may miss it.
     assert np.all(np.isnan(ahead) | (ahead * 200 >= near * (1 - 1e-5)))
-
-
-@pytest.mark.parametrize("mask", range(1, 8))
-@pytest.mark.parametrize("reflect_mask", [0, 1, 2, 3, 4])
-def test_each_of_several_layers_with_common_walls_stops_rays(
-    world: PhysicsWorld, mask: int, reflect_mask: int
-) -> None:
-    for category in (1, 2, 4, 2):
-        add_room(world, category_bits=category)
-    pose, ends = (1, 2, 0.3), fan(100, 20)
-    fractions, reflect = world.cast_rays(pose, ends, mask, reflect_mask)
-    assert not np.isnan(fractions).any()
-    assert reflect.all() == reflect.any() == bool(mask & reflect_mask)
 
 
 def test_one_of_several_layers_is_moved_changed_and_destroyed(
