@@ -150,18 +150,6 @@ def test_the_last_value_of_a_step_has_the_time_after_it(
         assert output.latest.pose[0] == pytest.approx(0.015, abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    "plugin", [LASER, DIFF, TF], ids=["Laser", "DiffDrive", "ModelTfPublisher"]
-)
-def test_without_the_parameter_nothing_is_called_after_the_step(
-    plugin_world: Any, plugin: str
-) -> None:
-    world = plugin_world(f"- {{{plugin}}}")
-    updates = [update for each in world.model("robot").plugins for update in each.updates]
-    assert [update.phase for update in updates] == ["before"]
-    assert "after_step" in plugin_world.error(f"- {{{plugin}, after_step: 3}}")
-
-
 def test_a_model_that_is_spawned_later_publishes_after_its_first_step(plugin_world: Any) -> None:
     world = plugin_world(f"- {{{DIFF}, after_step: true}}")
     world.step(3)

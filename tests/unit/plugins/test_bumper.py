@@ -70,15 +70,6 @@ def test_topic_and_frame(plugin_world: Any, files: Any) -> None:
     assert output.latest.frame_id == "earth"
 
 
-def test_a_contact_is_in_the_message_of_the_same_step(
-    plugin_world: Any, files: Any, collect: Collect
-) -> None:
-    world = touching(plugin_world, files)
-    messages = collect(world, "/collisions")
-    world.step()
-    assert len(messages[0].collisions) == 1
-
-
 def test_empty_lists_are_published_at_the_update_rate(plugin_world: Any, collect: Collect) -> None:
     world = plugin_world("[{type: Bumper, name: bumper, update_rate: 20}]")
     messages = collect(world, "/collisions")

@@ -102,12 +102,6 @@ def test_parameters(plugin_world: Any, collect: Collect) -> None:
     assert (transform.x, transform.y, transform.yaw, transform.roll) == (0.1, 0.2, 0.3, 0.0)
 
 
-def test_a_global_frame_has_no_namespace(plugin_world: Any) -> None:
-    world = plugin_world("[{type: Gps, name: g, body: base, frame: /gps}]", namespace="r1")
-    world.step()
-    assert list(world.transforms) == [("r1_base", "gps")]
-
-
 def test_transform_is_sent_at_the_update_rate_without_subscribers(plugin_world: Any) -> None:
     world = plugin_world(GPS)
     world.step()

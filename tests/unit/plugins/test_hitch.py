@@ -55,14 +55,6 @@ def anchors(world: flatland.World) -> float:
     return math.dist(hook, eye)
 
 
-def test_the_first_command_that_fails_is_logged(tow: Any, caplog: pytest.LogCaptureFixture) -> None:
-    world = tow(x=-5.0)
-    world.command("/hitch").set(True)
-    world.step()
-    assert hitch(world).hitched is None
-    assert [record.levelname for record in caplog.records] == ["WARNING"]
-
-
 class TestTowing:
     @pytest.mark.parametrize("joint", ["hinge", "weld"])
     def test_trailer_follows(self, tow: Any, joint: str) -> None:

@@ -10,7 +10,6 @@ import pytest
 
 import flatland
 from flatland.errors import StaleHandleError
-from flatland.plugins import laser as laser_module
 from flatland.plugins.laser import cast_scans, compute_scans
 from flatland.runtime.plugin_costs import PluginCosts
 
@@ -130,30 +129,18 @@ class TestEmittedScans:
             laser._output.subscribe(found.append)
         return found
 
-    def test_scans_that_are_cast_together_equal_single_ones(
-        self, robots: Robots, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        calls: list[int] = []
-
-        def count(requests: Any, *arguments: Any) -> Any:
-            calls.append(len(requests))
-            return perform(requests, *arguments)
-
-        perform = laser_module._perform
-        monkeypatch.setattr(laser_module, "_perform", count)
+    def test_scans_that_are_cast_together_equal_single_ones(self, robots: Robots) -> None:
         found = []
         for together in (True, False):
             world = robots.world()
             scans = self.emitted(robots.lasers(world))
             # Wall times are attributed to each plugin, so that nothing is done together.
             world.plugin_host.costs = None if together else PluginCosts()
-            calls.clear()
             for _ in range(3):
                 world.step()
                 for laser in robots.lasers(world):
                     laser.compute_ranges()  # has no effect on what is emitted
             assert len(scans) == 27
-            assert calls.count(9) == (3 if together else 0)
             found.append([(s.frame_id, s.ranges.tobytes(), s.intensities.tobytes()) for s in scans])
         assert found[0] == found[1]
 

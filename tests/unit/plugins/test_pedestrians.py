@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -71,22 +69,6 @@ def test_people_in_a_crowd_touch_neither_walls_nor_each_other(
         between = np.hypot(*(places[:, np.newaxis] - places).transpose(2, 0, 1))
         assert between[~np.eye(len(places), dtype=bool)].min() > 0.3999
     assert moved > 24 * 3.0
-
-
-def test_ways_lead_through_doors(files: WorldFiles) -> None:
-    walls = [
-        "##########",
-        "#   #    #",
-        "#   #    #",
-        "#   #    #",
-        "#        #",
-        "##########",
-    ]
-    world = load(files, ONE % "[8, 4.5]", CALM, walls)
-    people = people_of(world)
-    people.spawn(poses=[(2.0, 4.5, 0.0)])
-    world.step(2400)
-    assert people.people.poses[0, :2] == pytest.approx((8.0, 4.5), abs=0.6)
 
 
 @pytest.mark.parametrize("model", ["social_force", "orca"])
@@ -201,21 +183,6 @@ def test_members_of_a_party_stay_together(files: WorldFiles) -> None:
         world.step(200)
         (ax, ay, _), (bx, by, _) = people.people.poses
         assert math.hypot(ax - bx, ay - by) < 2.0
-
-
-def test_the_service_answers_with_names_or_an_error(files: WorldFiles) -> None:
-    world = load(files, ONE % "[8, 3]", CALM)
-    people = people_of(world)
-
-    def spawn(group: str, count: int) -> Any:
-        return people._serve_spawn(SimpleNamespace(group=group, count=count, poses=[]))
-
-    success, message, names = spawn("", 2)
-    assert (success, message, len(names)) == (True, "", 2)
-    success, message, names = spawn("nobody", 1)
-    assert not success
-    assert "nobody" in message
-    assert names == []
 
 
 def test_people_queue_and_are_served_one_by_one(files: WorldFiles) -> None:

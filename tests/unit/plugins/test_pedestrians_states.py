@@ -64,6 +64,9 @@ def test_services_spawn_direct_and_remove_people(files: WorldFiles) -> None:
     poses = [SimpleNamespace(x=float(x), y=2.0, theta=0.0) for x in (2, 4)]
     spawned = services["spawn_people"](SimpleNamespace(group="", count=0, poses=poses))
     assert spawned == (True, "", ["a_0", "a_1"])
+    unknown = services["spawn_people"](SimpleNamespace(group="nobody", count=1, poses=[]))
+    assert (unknown[0], unknown[2]) == (False, [])
+    assert "nobody" in unknown[1]
     stop = SimpleNamespace(names=["a_1"], action=0, STOP=0, RESUME=1, SEND=2)
     assert services["direct_people"](stop) == (True, "")
     world.step(200)

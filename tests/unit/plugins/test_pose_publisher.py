@@ -75,27 +75,3 @@ def test_odometry_has_the_velocity_of_the_observed_frame_in_its_own_axes(
     c, s = math.cos(0.75), math.sin(0.75)
     assert value.twist == pytest.approx((c * vx + s * vy, c * vy - s * vx, 2.0), abs=1e-6)
     assert not value.pose_covariance.any()
-
-
-def test_the_twist_is_the_derivative_of_the_pose(plugin_world: Any, collect: Collect) -> None:
-    world = plugin_world(
-        "[{type: PosePublisher, name: truth, body: arm, message: odometry, origin: [0.4, 0.3, 1]}]",
-        bodies=ARM,
-    )
-    values = collect(world, "/odometry")
-    world.model("robot").body("arm").set_velocity(0.5, -0.2, 1.0)
-    world.step(3)
-    (x0, y0, a0), (x2, y2, a2) = values[0].pose, values[2].pose
-    vx, vy, omega = ((b - a) / 0.01 for a, b in ((x0, x2), (y0, y2), (a0, a2)))
-    c, s = math.cos(values[1].pose[2]), math.sin(values[1].pose[2])
-    central = (c * vx + s * vy, c * vy - s * vx, omega)
-    assert values[1].twist == pytest.approx(central, abs=1e-3)
-
-
-def test_a_moved_model_has_its_new_pose_at_once(plugin_world: Any, collect: Collect) -> None:
-    world = plugin_world("[{type: PosePublisher, name: truth}]")
-    poses = collect(world, "/pose")
-    world.step()
-    world.move_model("robot", (3, 4, 1))
-    world.step()
-    assert poses[-1].pose == pytest.approx((3, 4, 1), abs=1e-6)

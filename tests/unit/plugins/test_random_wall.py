@@ -146,29 +146,6 @@ def test_new_walls_have_the_friction_of_the_layer_and_its_bits(
     assert world.physics.ray_cast((2.0, 3.0), (2.0, 0.5), 0b100) is None
 
 
-def test_lasers_see_the_new_wall(plugin_world: Any, files: Any) -> None:
-    # Two beams: to the right and ahead.
-    angle = "{min: -1.570796, max: 0, increment: 1.570796}"
-    laser = f"[{{type: Laser, name: l, body: base, range: 9, angle: {angle}}}]"
-    world = plugin_world(
-        laser,
-        pose=(2, 3, 0),
-        layers=lines(files, "0 0 4 0"),
-        world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.75"),
-    )
-    assert world.model("robot").plugin("l").compute_ranges()[0] == pytest.approx(2.25, abs=1e-4)
-
-
-def test_robots_collide_with_the_new_wall(plugin_world: Any, files: Any) -> None:
-    world = plugin_world(
-        pose=(2, 3, 0), layers=lines(files, "0 0 4 0"), world_plugins=wall("num_of_walls: 1")
-    )
-    base = world.model("robot").body("base")
-    base.set_velocity(0.0, -1.0, 0.0)
-    world.step(600)
-    assert base.pose[1] == pytest.approx(1.2, abs=0.02)
-
-
 def test_observers_are_notified(plugin_world: Any, files: Any) -> None:
     class Watcher(flatland.WorldObserver):
         def __init__(self) -> None:

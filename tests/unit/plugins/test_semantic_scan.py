@@ -138,18 +138,6 @@ def test_ranges_are_those_of_a_laser(plugin_world: Any, files: Any, collect: Col
         assert (other.labels == 1).all()
 
 
-def test_what_a_mirror_shows_has_its_own_label(scan_world: Any) -> None:
-    world = scan_world()
-    mirror = "bodies: [{name: glass, type: static, footprints: [{type: polygon, density: 0, "
-    mirror += "points: [[0, -4], [0.1, -4], [0.1, 4], [0, 4]], material: {specular: 1}}]}]"
-    world.spawn_model("\n" + mirror, "mirror", pose=(1, 0, 0))
-    world.spawn_model("plant.yaml", "plant", pose=(-1.5, 0, 0))
-    output = world.output("/semantic_scan")
-    world.step()
-    assert labels(output.latest)[1].name == "plant"
-    assert output.latest.ranges[1] == pytest.approx(1 + 1 + 1.2, abs=1e-4)
-
-
 def test_models_that_are_deleted_and_spawned_again(scan_world: Any) -> None:
     world = scan_world()
     output = world.output("/semantic_scan")

@@ -242,30 +242,6 @@ class TestOdometry:
         assert odometry[-1].twist == pytest.approx(expected, abs=1e-3)
         assert truths[-1].twist == pytest.approx(expected, abs=1e-3)
 
-    def test_frames_have_no_namespace(self, plugin_world: Any, collect: Collect) -> None:
-        world = plugin_world(
-            drive("odom_frame_id: o, ground_truth_frame_id: /w, odom_pub: a, ground_truth_pub: b"),
-            bodies=BODIES,
-            joints=joints(),
-            namespace="r1",
-        )
-        truths, odometry = collect(world, "/r1/b"), collect(world, "/r1/a")
-        world.step()
-        assert (odometry[0].frame_id, odometry[0].child_frame_id) == ("o", "r1_base")
-        assert (truths[0].frame_id, truths[0].child_frame_id) == ("/w", "r1_base")
-
-    def test_transform_to_the_body_on_request(self, trike: Any, collect: Collect) -> None:
-        extra = "enable_odom_tf_pub: true, odom_pose_noise: [1, 1, 1], pub_rate: 50"
-        world = trike(extra, namespace="r1", pose=(1.0, 2.0, 0.5))
-        odometry = collect(world, "/r1" + ODOMETRY)
-        for _ in range(9):
-            world.step()
-            assert list(world.transforms) == [("odom", "r1_base")]
-            sent = world.transforms["odom", "r1_base"]
-            assert (sent.x, sent.y, sent.yaw) == odometry[-1].pose
-            assert sent.stamp == odometry[-1].stamp
-        assert sent.stamp == 40_000_000
-
     def test_no_transform_and_no_twist_topic(self, trike: Any) -> None:
         world = trike()
         world.step()
@@ -321,18 +297,6 @@ class TestTwistCommand:
         assert plugin(world).steering_angle == pytest.approx(math.atan2(0.5 * 0.8, 0.6))
         assert base(world).velocity[2] == pytest.approx(0.8, abs=1e-5)
 
-    def test_robot_drives_the_commanded_circle(self, trike: Any) -> None:
-        world = trike("command: twist")
-        command(world, 0.5, 0.5)
-        for _ in range(20):
-            world.step(50)
-            x, y, theta = base(world).pose
-            rear = (x - math.cos(theta), y - math.sin(theta))
-            # A radius of v / omega = 1 m.
-            centre = (rear[0] - math.sin(theta), rear[1] + math.cos(theta))
-            assert centre == pytest.approx((-1.0, 1.0), abs=0.02)
-        assert theta == pytest.approx(0.5 * world.time, rel=0.01)
-
     @pytest.mark.parametrize("sign", [1.0, -1.0])
     def test_beyond_the_steering_limit_the_speed_is_kept(self, trike: Any, sign: float) -> None:
         world = trike("command: twist, max_steer_angle: 0.5")
@@ -347,14 +311,6 @@ class TestTwistCommand:
         world.step(50)
         assert plugin(world).steering_angle == 1.5
         assert base(world).pose == pytest.approx((0.0, 0.0, 0.0), abs=1e-4)
-
-    def test_turn_in_place_about_the_rear_center(self, trike: Any) -> None:
-        world = trike("command: twist, max_steer_angle: 1.5708")
-        command(world, 0.0, 1.0)
-        world.step(200)
-        x, y, theta = base(world).pose
-        assert theta == pytest.approx(1.0, abs=0.02)
-        assert (x - math.cos(theta), y - math.sin(theta)) == pytest.approx((-1.0, 0.0), abs=0.02)
 
     def test_a_limit_of_the_speed_keeps_the_curvature(self, trike: Any) -> None:
         world = trike("command: twist, linear_dynamics: {velocity_limit: 0.25}")
