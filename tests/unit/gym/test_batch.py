@@ -117,18 +117,6 @@ def test_an_exception_of_one_world_ends_the_steps_of_all(make: Make, room: Path)
     assert not env._stage.worlds[1].requests.lock._is_owned()
 
 
-def test_the_core_performs_all_steps_alone_after_those_with_first_updates(
-    make: Make, room: Path
-) -> None:
-    env, commands, ones = begun(make, room)
-    batch = env._episodes._batch
-    assert batch.perform(commands, ones, 20, lambda: None).tolist() == []
-    env._stage.worlds[1].add_observer(Watcher())
-    assert batch.perform(commands, ones, 20, lambda: None).tolist() == [1]
-    env._stage.worlds[2].physics.pre_solve = lambda *_: None
-    assert batch.perform(commands, ones, 20, lambda: None).tolist() == [1, 2]
-
-
 def test_a_refused_call_of_the_core_advances_no_world(make: Make, room: Path) -> None:
     env = make(FlatlandVectorEnv, COUNT, room)
     env.reset(seed=0)

@@ -172,13 +172,6 @@ def test_a_brief_contact_within_a_step_counts(make: Make, room: Path) -> None:
     assert terminated
 
 
-def test_the_time_limit_truncates(make: Make) -> None:
-    env = make(world="corridor", max_steps=5)
-    env.reset(seed=0)
-    results = [env.step(np.array([-1.0, 0.0], np.float32)) for _ in range(5)]
-    assert [result[2:4] for result in results] == [(False, False)] * 4 + [(False, True)]
-
-
 def test_reward_and_ending_are_replaceable(make: Make) -> None:
     env = make(world="corridor", reward=2.0 * Step(), ending=Arrived(), max_steps=3)
     env.reset(seed=0)

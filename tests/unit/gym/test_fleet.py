@@ -10,7 +10,6 @@ import pytest
 from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded
 from pettingzoo.test import parallel_api_test
 
-import flatland
 from flatland.gym import make_parallel
 
 Make = Callable[..., Any]
@@ -109,12 +108,6 @@ def test_a_closed_environment_is_of_no_use(make: Make) -> None:
     for use in (env.reset, lambda: env.step({}), env.render):
         with pytest.raises(ClosedEnvironmentError):
             use()
-
-
-def test_too_many_robots_are_an_error(make: Make) -> None:
-    env = make(make_parallel, world="corridor", num_robots=60)
-    with pytest.raises(flatland.WorldError, match="no free place"):
-        env.reset(seed=0)
 
 
 @pytest.mark.parametrize("arguments", [{"num_robots": 0}, {"render_mode": "ansi"}])

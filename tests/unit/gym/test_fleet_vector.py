@@ -24,7 +24,6 @@ from flatland.gym import (
     Scan,
     ScanNoise,
     Stacked,
-    Step,
     Velocity,
     make_parallel,
 )
@@ -144,24 +143,6 @@ def test_the_number_of_threads_changes_nothing(make: Make) -> None:
         runs.append([envs.step(envs.action_space.sample()) for _ in range(40)])
     for other in runs[1:]:
         assert_same(runs[0], other)
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_single_robots_equal_a_vector_of_environments(make: Make, mode: AutoresetMode) -> None:
-    kwargs = {"autoreset_mode": mode, "max_steps": 20, "reward": Step()}
-    fleets = make(FleetVectorEnv, 3, num_robots=1, **kwargs)
-    again = make(FleetVectorEnv, 3, num_robots=1, **kwargs)
-    assert fleets._episodes._batch is not None
-    again._episodes._batch = None  # without the core
-    assert_same(fleets.reset(seed=1), again.reset(seed=1))
-    for _ in range(60):
-        actions = np.tile([0.8, 0.3], (3, 1))
-        result = fleets.step(actions)
-        assert_same(result, again.step(actions))
-        ended = result[2] | result[3]
-        if mode is AutoresetMode.DISABLED and ended.any():
-            options = {"reset_mask": ended}
-            assert_same(fleets.reset(options=options), again.reset(options=options))
 
 
 def test_spaces_and_attributes(make: Make) -> None:

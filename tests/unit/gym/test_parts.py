@@ -52,42 +52,6 @@ def written(observation: Observation, situation: Situation) -> np.ndarray:
     return out
 
 
-def test_the_situation_is_that_of_the_robot(situation: Situation) -> None:
-    np.testing.assert_allclose(situation.distance, [2.0, 0.0])
-    np.testing.assert_allclose(situation.goal_ahead, [2.0, 0.0], atol=1e-12)
-    np.testing.assert_allclose(situation.goal_left, [0.0, 0.0], atol=1e-12)
-    np.testing.assert_allclose(situation.speed, [0.5, 9.0])
-    np.testing.assert_array_equal(situation.yaw_rate, [-1.0, 9.0])
-    np.testing.assert_array_equal(situation.arrived, [False, True])
-
-
-def test_a_scan_is_scaled_by_the_range(situation: Situation) -> None:
-    out = written(Observation(Scan()), situation)
-    np.testing.assert_array_equal(out, [[0.25, 0.5, 1, 1, 0, 1], [1] * 6])
-
-
-def test_near_ranges_are_spread(situation: Situation) -> None:
-    out = written(Observation(Scan(half=1.0)), situation)
-    np.testing.assert_allclose(out, [[0.5, 2 / 3, 1, 1, 0, 1], [1] * 6], rtol=1e-6)
-
-
-def test_a_sector_has_its_nearest_range(situation: Situation) -> None:
-    out = written(Observation(Scan(3)), situation)
-    np.testing.assert_array_equal(out, [[0.25, 1, 0], [1, 1, 1]])
-
-
-def test_the_goal_is_observed_in_the_frame_of_the_robot(situation: Situation) -> None:
-    situation.goals[0] = (-2.0, 1.0)  # 3 m to the left
-    situation.locate(0.3)
-    out = written(Observation(Goal(scale=6.0)), situation)
-    np.testing.assert_allclose(out, [[0.5, 0, 1], [0, 0, 0]], atol=1e-7)
-
-
-def test_velocities_are_scaled_and_limited(situation: Situation) -> None:
-    out = written(Observation(Velocity()), situation)
-    np.testing.assert_allclose(out, [[0.5, -0.5], [1, 1]])
-
-
 def test_parts_are_columns_or_entries(situation: Situation) -> None:
     situation.actions[:] = [(0.5, -0.5), (1.0, 0.0)]
     parts = (Goal(), LastAction(), Velocity())

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flatland.gym import FixedGoal, FlatlandEnv, FlatlandVectorEnv, evaluate
+from flatland.gym import FlatlandEnv, FlatlandVectorEnv, evaluate
 from flatland.gym.policies import INCLUDED, Policy, PolicyError, PolicyRobot
 
 Make = Callable[..., Any]
@@ -24,18 +24,6 @@ def test_the_included_policy_reaches_goals(make: Make) -> None:
 
 def test_the_included_policy_is_small() -> None:
     assert INCLUDED.stat().st_size < 1_000_000
-
-
-def test_the_policy_drives_around_a_pillar(make: Make) -> None:
-    # The pillar extends from (3, 0) to (3.6, 1.1); there is room above it.
-    envs = make(
-        FlatlandVectorEnv,
-        1,
-        "corridor",
-        autoreset_mode="SameStep",
-        task=FixedGoal((2, 1.0, 0), (4.6, 1.2)),
-    )
-    assert evaluate(Policy(env=envs), envs, 1).is_success.all()
 
 
 def test_actions_do_not_depend_on_other_environments(make: Make) -> None:

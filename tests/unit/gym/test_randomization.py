@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from nested import assert_same
 
@@ -137,10 +136,6 @@ def test_robots_of_a_fleet_differ(make: Make) -> None:
         results = [env.step(dict.fromkeys(env.agents, FORWARD)) for _ in range(3)]
         runs.append((radii, results))
     assert_same(*runs)
-
-
-def test_the_environment_passes_the_checker(make: Make) -> None:
-    check_env(make(world="corridor", randomization=ALL), skip_render_check=True)
 
 
 def test_parts_of_one_object_are_independent_in_two_environments(make: Make) -> None:
