@@ -59,24 +59,6 @@ def test_an_output_without_a_subscriber_is_not_computed(node: Any) -> None:
     assert [scan.stamp for scan in scans.sent] == [4 * STEP_NS, 6 * STEP_NS]
 
 
-def test_the_messages_of_a_step_follow_its_time_and_its_transforms(node: Any) -> None:
-    order: list[str] = []
-    for name in ("scan", "odometry/filtered", "/tf", "/clock"):
-        topic = node.transport.topics[name]
-        topic.connect()
-        topic.send = topic.publish = lambda *_, name=name: order.append(name)
-    step(node, 0.0)
-    assert order == ["/clock", "/tf", "odometry/filtered", "scan"]
-
-
-def test_a_value_emitted_between_two_steps_is_published_at_once(node: Any) -> None:
-    scans = node.transport.topics["scan"]
-    scans.connect()
-    step(node, 0.02)
-    node.run(lambda: node.world.output("/scan").emit(scans.sent[0]))
-    assert scans.sent[2:] == scans.sent[:1]
-
-
 def test_ports_without_an_adapter_are_named(
     serve: Any,
     files: Any,

@@ -182,14 +182,6 @@ def test_the_rate_starts_again_with_a_reset(world: Any) -> None:
     assert rate.status(10.6).text == "20.0 steps per second"
 
 
-def test_in_lockstep_there_is_no_rate_to_hold(world: Any) -> None:
-    rate = _Rate(Simulation(world, 100.0, lockstep=True))
-    status = rate.status(1.0)
-    assert status.text == "lockstep: 0.0 steps per second"
-    assert status.values["update rate [Hz]"] == "on request"
-    assert "target real-time factor" not in status.values
-
-
 def test_subscribers_that_do_not_keep_up_are_named(transport: Any) -> None:
     drops = _Drops(transport)
     transport.lost.update({("/scan", "/rviz"): 3, ("/clock", "/rviz"): 4})

@@ -110,13 +110,6 @@ def test_a_model_can_be_dragged_onto_another_one(
     assert "overlaps" not in caplog.text
 
 
-def test_a_world_paused_before_a_drag_remains_paused(setup: Setup) -> None:
-    setup.world.pause()
-    setup.send("a", Event.PRESS)
-    setup.send("a", Event.RELEASE)
-    assert setup.world.paused
-
-
 def test_a_pause_by_other_means_during_a_drag_remains(setup: Setup) -> None:
     setup.send("a", Event.PRESS)
     setup.world.resume()

@@ -173,8 +173,3 @@ def test_messages_of_an_output_that_is_closed_within_a_step_are_sent(setup: Setu
     assert setup.step() == ["start 0", "first", "clock 5", "tf"]
     assert setup.topics["/first"].sent == [9.0]
     assert setup.topics["/first"].closed
-
-
-def test_unconnected_topics_receive_nothing(setup: Setup) -> None:
-    setup.topics["/first"].connected = False
-    assert setup.step() == ["start 0", "clock 5", "tf", "second"]

@@ -23,18 +23,6 @@ from flatland.node.served_world import ServedWorld
 from flatland.node.services import SERVICES
 
 WORLD = "{properties: {}, layers: [{name: 2d}]}"
-ROBOT = """
-bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
-plugins: [{type: DiffDrive, name: drive, body: base}]
-"""
-
-
-NOISY = """
-bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
-plugins:
-  - {type: Laser, name: laser, body: base, range: 20, update_rate: 10, noise_std_dev: 0.1,
-     always_publish: true, angle: {min: -1.5, max: 1.5, increment: 0.5}}
-"""
 
 
 def test_a_running_world_has_its_topics_and_services(serve: Any, transport: Any) -> None:
@@ -125,32 +113,6 @@ def test_the_end_stops_all_threads(serve: Callable[..., Any]) -> None:
         assert not thread.is_alive(), thread
 
 
-def scans(serve: Any, transport: Any, seed: int | None) -> list[list[float]]:
-    """Returns the ranges of noisy scans of a node."""
-    robot = "{name: r, model: noisy.model.yaml, pose: [3.5, 2.5, 0]}"
-    world = f"{{properties: {{}}, layers: [{{name: 2d, map: room.yaml}}], models: [{robot}]}}"
-    node = serve(world, lockstep=True, seed=seed)
-    transport.topics["scan"].connect()
-    assert node.call("step_world", duration=0.5).success
-    return [list(scan.ranges) for scan in transport.topics["scan"].sent]
-
-
-def test_noise_depends_on_the_seed(
-    serve: Any, files: Any, transport: Any, caplog: pytest.LogCaptureFixture
-) -> None:
-    files.write("noisy.model.yaml", NOISY)
-    files.write_map("room", ["#######", "#     #", "#     #", "#     #", "#######"])
-    caplog.set_level("INFO")
-    first, second, other = (scans(serve, transport, seed) for seed in (42, 42, 43))
-    assert len(first) == 5
-    assert first == second
-    assert all(a != b for a, b in zip(first, other, strict=True))
-    assert "drawn at random" not in caplog.text
-    unseeded = scans(serve, transport, None)
-    (drawn,) = re.findall(r"seed (\d+) drawn at random", caplog.text)
-    assert scans(serve, transport, int(drawn)) == unseeded
-
-
 def test_a_map_is_simplified_on_request(serve: Any, files: Any) -> None:
     pixels = np.full((60, 60), 255, np.uint8)
     cv2.circle(pixels, (30, 30), 25, 0, thickness=-1)
@@ -197,18 +159,6 @@ def test_parameters_of_the_world(serve: Any, tmp_path: Path) -> None:
     assert record.exists()
     assert node.world.timekeeper.step_size == 0.02
     assert node.served.simulation.rate == pytest.approx(33.0)
-
-
-def test_a_node_runs_without_its_viewer_if_that_cannot_start(
-    serve: Any, caplog: pytest.LogCaptureFixture
-) -> None:
-    node = serve(web=True, web_port=0, web_host="no such host")
-    wait_until("the error", lambda: "cannot start" in caplog.text)
-    assert (
-        "the viewer in the browser cannot start: the viewer cannot listen on port 0" in caplog.text
-    )
-    assert "The simulator continues without it" in caplog.text
-    assert node.run(lambda: node.world.closed) is False
 
 
 def test_a_benchmark_logs_its_speed(serve: Any, caplog: pytest.LogCaptureFixture) -> None:

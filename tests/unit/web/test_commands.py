@@ -217,17 +217,6 @@ class TestHold:
         assert not world.paused
         np.testing.assert_allclose(world.models[0].pose, [6, 6, 0], atol=1e-3)
 
-    def test_a_pause_of_somebody_else_remains(self, client, robot, world):
-        client.ask("pause")
-        client.ask("hold", model=robot)
-        client.ask("release", model=robot)
-        assert world.paused
-        client.ask("resume")
-        client.ask("hold", model=robot)
-        client.ask("pause")
-        client.ask("release", model=robot)
-        assert world.paused
-
     def test_the_last_client_that_releases_resumes(self, client, robot, url, world):
         with RawWebClient(url) as other:
             client.ask("hold", model=robot)
