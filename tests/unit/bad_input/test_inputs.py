@@ -1,7 +1,8 @@
 """Invalid contents of files: the class of the error, its text, its line and its hint.
 
 `test_keys.py` generates the cases of single keys: missing, misspelled, of a wrong type or size. The
-parameters of plugins with a rule of their own are in the tests of the plugins.
+parameters of plugins with a rule of their own are in the tests of the plugins, text that is not
+valid YAML and errors of `$include` are in the tests of `flatland.config`.
 """
 
 from __future__ import annotations
@@ -118,8 +119,6 @@ def line_map(scale: str, error: str) -> Input:
 
 NO_BODIES = 'Invalid "bodies" in "robot" model, must be a list of bodies of at least size 1'
 TWO_ITEMS = f'Invalid "bodies" in {PLACE} joint "j", must be a sequence of exactly two items'
-MALFORMED = 'Malformatted file, path="{path}", '
-NO_INCLUDE = "File specified in $include does not exist, "
 RANGE = 'Invalid "range", must be greater than 0 and at most 1e+06 m, got '
 NINE_POINTS = f"[{', '.join(['[0, 0]'] * 9)}]"
 NO_BODY = ('Body with name "bas" does not exist', 'did you mean "base"?')
@@ -245,31 +244,6 @@ INPUTS: dict[str, Input] = {
         'Invalid "plugins" in "robot" model, plugin with name "p" already exists',
         4,
     ),
-    # Files of any kind.
-    "no merge keys": model(
-        "bodies:\n  - {<<: {name: base}, footprints: []}\n",
-        f'Entry "name" does not exist (in {PLACE} "bodies" index=0)',
-        2,
-    ),
-    "undefined alias": model(
-        "bodies: *nothing\n", f'{MALFORMED}line 1 col 9, undefined alias "nothing"', 0
-    ),
-    "a list as a key": model("? [a]\n: b\n", f"{MALFORMED}line 1 col 3, a key must be a scalar", 0),
-    "tab as indentation": model(
-        "bodies:\n\t- name: base\n",
-        f"{MALFORMED}line 2 col 1, found character that cannot start any token",
-        0,
-        "indent with spaces, not with tabs, and quote values that start with @, ` or %",
-    ),
-    "a list item without a list": model(
-        "bodies: $[include] other.yaml\n", "$[include] must be an item of a list"
-    ),
-    "included file is missing": model(
-        "bodies:\n  $include nothing.yaml\n",
-        NO_INCLUDE + "path={folder}/nothing.yaml, include=nothing.yaml",
-        2,
-    ),
-    "include of nothing": model("bodies: $include\n", NO_INCLUDE + "path={folder}, include="),
     # Plugins.
     "Laser increment 0": laser(
         "increment: 0.5", "increment: -0", 'Invalid "angle" params, increment must not be zero!'
@@ -608,8 +582,6 @@ def test_a_manifest_that_is_no_file(tmp_path: Path, unchanged: Any) -> None:
         ({"step_size": NAN}, "step"),
         ({"step_size": INF}, "step"),
         ({"step_size": 1e308}, "step"),
-        ({"simplify_map": 3}, "simplify_map must be 0, 1 or 2, got 3"),
-        ({"simplify_map": -1}, "simplify_map must be 0, 1 or 2, got -1"),
         ({"plugin_timeout": 0.0}, "plugin_timeout must be positive"),
         ({"plugin_timeout": NAN}, "plugin_timeout must be positive"),
         ({"model_path": []}, "model_path must contain at least one folder"),
@@ -652,22 +624,6 @@ REQUESTS: dict[str, tuple[Request, str]] = {
         )
         for number in (NAN, INF, -INF, 1e308)
     },
-    "spawn without a name": (
-        lambda world: world.spawn_model("good.model.yaml", ""),
-        "Flatland World: failed to spawn model, its name must not be empty",
-    ),
-    "spawn without a path": (
-        lambda world: world.spawn_model("", "new"),
-        'Flatland World: failed to spawn model "new", the path must not be empty',
-    ),
-    "spawn an existing name": (
-        lambda world: world.spawn_model("good.model.yaml", "first"),
-        'Flatland YAML: Model with name "first" already exists',
-    ),
-    "spawn in an illegal namespace": (
-        lambda world: world.spawn_model("good.model.yaml", "new", "my robot"),
-        'Flatland World: failed to spawn model "new", namespace "my robot" is not a legal ROS name',
-    ),
     "spawn a path with a null character": (
         lambda world: world.spawn_model("good\0.yaml", "new"),
         "Flatland YAML: File does not exist, path=",

@@ -226,25 +226,6 @@ MISTAKES: dict[str, Mistake] = {
         ("world.yaml", 4, 'Invalid "pose", must be within +-1e+09, got [1e+30, 0.0, 0.0]', ""),
         robot=MODEL,
     ),
-    "a key that is similar to two": of_model(
-        plugins(DRIVE % ", twist_topic: cmd"),
-        (
-            "robot.yaml",
-            3,
-            'Entry plugin "drive" contains unrecognized entry(s) {"twist_topic"}',
-            'did you mean "twist_pub" or "twist_sub"?',
-        ),
-    ),
-    "unknown layer of a laser": of_world(
-        f"{WORLD}{ROBOT % '[1, 1, 0]'}",
-        (
-            "robot.yaml",
-            3,
-            'Model Plugin "l" type "Laser" model "r": Flatland YAML: Cannot find',
-            "layers of the world: room",
-        ),
-        robot=plugins(LASER % ("l", ", layers: [2d]")),
-    ),
     # Valid values that are probably mistakes.
     "pixels of 1e-9 m": of_world(
         WORLD.replace("room.yaml", "map.yaml"),
@@ -299,9 +280,6 @@ MISTAKES: dict[str, Mistake] = {
         plugins(DRIVE % "", TF % ", publish_tf_world: true"),
         ("robot.yaml", 4, '~TF frame "base" has two parents, "odom" from Model Plugin "drive"', ""),
     ),
-    "a frame with one parent": of_model(
-        plugins(DRIVE % ", enable_odom_tf_pub: false", TF % ", publish_tf_world: true")
-    ),
     "two lasers of one frame": of_model(
         plugins(
             LASER % ("a", ", frame: eye"),
@@ -321,9 +299,6 @@ MISTAKES: dict[str, Mistake] = {
         ),
         ("robot.yaml", 4, '~frame "eye" has two poses, of Model Plugin "a" type "Laser"', ""),
     ),
-    "two lasers of one frame in one place": of_model(
-        plugins(LASER % ("a", ", frame: eye"), LASER % ("b", ", frame: eye, topic: b"))
-    ),
     "two publishers of one topic": of_model(
         plugins(LASER % ("a", ""), LASER % ("b", "")),
         ("robot.yaml", 4, '~topic "/scan" is published by Model Plugin "a" type "Laser" model', ""),
@@ -336,11 +311,6 @@ MISTAKES: dict[str, Mistake] = {
         ("robot.yaml", 3, '~topic "/odometry/ground_truth" is published by', ""),
         ("robot.yaml", 3, '~topic "/twist" is published by', ""),
         robot=plugins(DRIVE % ""),
-    ),
-    "two robots with namespaces": of_world(
-        f"{WORLD}models:\n- {{name: a, model: robot.yaml, namespace: a, pose: [1, 1, 0]}}\n"
-        "- {name: b, model: robot.yaml, namespace: b, pose: [2, 2, 0]}\n",
-        robot=plugins(DRIVE % "", LASER % ("l", "")),
     ),
     "bumpers of one topic": of_model(plugins("{type: Bumper, name: a}", "{type: Bumper, name: b}")),
 }

@@ -127,30 +127,6 @@ def test_an_invalid_file_is_an_error(files, capsys):
     assert '"layers" must be a list' in capsys.readouterr().err
 
 
-def test_all_services_of_the_node(robot_world, capsys):
-    services = {
-        service["name"]: service["type"] for service in info(robot_world, capsys)["services"]
-    }
-    assert services == {
-        "spawn_model": "flatland/SpawnModel",
-        "delete_model": "flatland/DeleteModel",
-        "move_model": "flatland/MoveModel",
-        "spawn_models": "flatland/SpawnModels",
-        "move_models": "flatland/MoveModels",
-        "delete_models": "flatland/DeleteModels",
-        "get_model_states": "flatland/GetModelStates",
-        "set_appearance": "flatland/SetAppearance",
-        "set_layer_map": "flatland/SetLayerMap",
-        "set_rate": "flatland/SetRate",
-        "step_world": "flatland/StepWorld",
-        "reset_world": "flatland/ResetWorld",
-        "wait_until_ready": "flatland/WaitUntilReady",
-        "pause": "std_srvs/Empty",
-        "resume": "std_srvs/Empty",
-        "toggle_pause": "std_srvs/Empty",
-    }
-
-
 @pytest.mark.parametrize(
     ("pairs", "lines"),
     [

@@ -317,12 +317,6 @@ def test_paths_are_relative_to_the_file_that_contains_them(
     assert reader.resolve_path("x") == str(tmp_path / "x")
 
 
-def test_absolute_and_home_paths(files: Files, monkeypatch: pytest.MonkeyPatch) -> None:
-    files.write(sub__b="1")
-    monkeypatch.setenv("HOME", str(files.folder / "sub"))
-    assert files.plain(f"[$include {files.path('sub__b')}, $include ~/b.yaml]") == ["1", "1"]
-
-
 def test_file_names_can_contain_spaces(files: Files) -> None:
     files.write(**{"a b": "1"})
     assert files.plain("x: $include   a b.yaml  ") == {"x": "1"}

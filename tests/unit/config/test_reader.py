@@ -473,14 +473,3 @@ def test_plain_returns_unconverted_data() -> None:
     shared = ["1", None, {"b": "on"}]
     assert reader.plain() == {"a": shared, "c": shared, "d": ""}
     assert reader.optional_subnode("no").plain() is None
-
-
-def test_the_reference_world(shared_dir: Path) -> None:
-    reader = YamlReader.from_file(shared_dir / "worlds" / "simple_test_A" / "world.yaml")
-    properties = reader.subnode("properties", "map")
-    assert properties.get("velocity_iterations", "int", 10) == 11
-    layers = list(reader.subnode("layers", "list").items())
-    assert layers[1].get_list("name", "string") == ["3d", "4d", "5d"]
-    assert layers[0].get("color", "color") == (0.0, 1.0, 0.0, 0.675)
-    poses = [m.get("pose", "pose", (0.0, 0.0, 0.0)) for m in reader.subnode("models").items()]
-    assert poses[1] == (3.0, 4.5, 3.14159)

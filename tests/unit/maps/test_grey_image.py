@@ -210,29 +210,6 @@ def test_the_grey_values_are_those_of_opencv(tmp_path: Path, name: str) -> None:
     np.testing.assert_array_equal(image, opencv_grey(cv2, FILES[name]))
 
 
-@pytest.mark.parametrize(
-    ("name", "channels"),
-    [
-        ("PNG LA", 1),
-        ("PNG RGBA", 3),
-        ("PNG 16 bits 4", 1),
-        ("TIFF RGB + alpha 2 <", 3),
-        ("TIFF RGB + alpha 2 >", 3),
-        ("TIFF RGB + alpha 1 <", 3),
-        ("BMP RGBA", 3),
-        ("WEBP lossless", 3),
-    ],
-)
-def test_alpha_is_ignored(tmp_path: Path, name: str, channels: int) -> None:
-    path = tmp_path / "map"
-    path.write_bytes(FILES[name])
-    colors = {"PNG 16 bits 4": WIDE >> 8}.get(name, COLORS)
-    if name == "PNG LA":
-        colors = np.asarray(Pillow.fromarray(COLORS).convert("LA"))
-    expected = colors[..., 0] if channels == 1 else colors[..., :3] @ [0.299, 0.587, 0.114]
-    np.testing.assert_allclose(read_grey_image(str(path)), expected, atol=1.1)
-
-
 def test_a_gif_and_an_animation_are_read(tmp_path: Path) -> None:
     first, second = Pillow.fromarray(GREY), Pillow.fromarray(255 - GREY)
     for kind in ("GIF", "WEBP"):

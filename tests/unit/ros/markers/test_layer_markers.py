@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import sys
 from typing import Any
 
 import numpy as np
@@ -96,29 +95,3 @@ def test_layer_without_edges_has_no_marker() -> None:
     markers = LayerMarkers(make_layer({}, np.empty((0, 4), np.float32)), RosWriter)
     assert markers_of(markers.lines(0)) == []
     assert markers_of(markers.walls(0)) == []
-
-
-def executed_lines(edge_count: int) -> int:
-    """Returns the number of Python lines executed to create and serialize the markers."""
-    edges = np.random.default_rng(1).uniform(-100, 100, (edge_count, 4)).astype(np.float32)
-    layer = make_layer({}, edges)
-    count = 0
-
-    def trace(_frame: Any, event: str, _argument: Any) -> Any:
-        nonlocal count
-        count += event == "line"
-        return trace
-
-    sys.settrace(trace)
-    try:
-        markers = LayerMarkers(layer, RosWriter)
-        for message in (markers.lines(0), markers.walls(0)):
-            assert message.packed
-    finally:
-        sys.settrace(None)
-    return count
-
-
-def test_no_python_line_is_executed_per_edge() -> None:
-    few = executed_lines(100)
-    assert 0 < executed_lines(50_000) <= few + 100

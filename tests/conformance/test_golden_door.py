@@ -1,4 +1,4 @@
-"""Comparison with a recorded trace: satellite positions of a robot, and a sliding door."""
+"""Comparison with a recorded trace: a robot that drives, and a sliding door."""
 
 from __future__ import annotations
 
@@ -10,9 +10,7 @@ from typing import Any
 import pytest
 
 import flatland
-from flatland.plugins.gps import Gps
 
-GPS_TOLERANCE = 1e-8  # deg
 POSE_TOLERANCE = 2e-4  # m and rad
 
 
@@ -21,24 +19,6 @@ def records(golden_dir: Path) -> list[dict[str, Any]]:
     trace = json.loads((golden_dir / "free.trace.json").read_text())
     found: list[dict[str, Any]] = trace["records"]
     return found
-
-
-def test_satellite_positions_match_the_trace(
-    golden_dir: Path, records: list[dict[str, Any]]
-) -> None:
-    # The robot is moved to the recorded poses to test the conversion separately from the motion.
-    worst = 0.0
-    with flatland.World.from_yaml(golden_dir / "free.yaml", seed=1) as world:
-        model = world.model("diff1")
-        gps = model.plugin("gps")
-        assert isinstance(gps, Gps)
-        for record in records:
-            model.body("base").set_pose(*record["bodies"]["diff1/base"][:3])
-            latitude, longitude = gps.compute_position()
-            expected = record["gps"]["diff1/gps"]
-            worst = max(worst, abs(latitude - expected[0]), abs(longitude - expected[1]))
-    print(f"\nGPS within {worst:.2g} degrees")
-    assert worst < GPS_TOLERANCE
 
 
 def test_the_door_matches_the_trace(golden_dir: Path, records: list[dict[str, Any]]) -> None:
