@@ -53,7 +53,8 @@ def random_actions(seed: int, n: int = 150) -> np.ndarray:
 @pytest.mark.parametrize("name", SINGLE)
 def test_the_checker_of_gymnasium_finds_nothing(name: str) -> None:
     env = gymnasium.make(name)
-    check_env(env.unwrapped)
+    # All draw with the same code.
+    check_env(env.unwrapped, skip_render_check=name != "flatland/Corridor-v0")
     env.close()
 
 
