@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from nested import assert_same
 
 import flatland.gym
+from flatland.gym import FlatlandEnv, FlatlandVectorEnv
 
 Make = Callable[..., Any]
 
@@ -75,3 +80,38 @@ def make() -> Iterator[Make]:
     yield create
     for env in made:
         env.close()
+
+
+@pytest.fixture
+def equals_singles(make: Make) -> Callable[..., tuple[Any, int]]:
+    """Steps a vector and as many single environments, whose results must be the same."""
+
+    def compare(
+        n: int,
+        steps: int,
+        mode: AutoresetMode = AutoresetMode.NEXT_STEP,
+        num_threads: int = 3,
+        **kwargs: Any,
+    ) -> tuple[Any, int]:
+        """Returns the vector, and the number of episodes that ended."""
+        vector = make(FlatlandVectorEnv, n, autoreset_mode=mode, num_threads=num_threads, **kwargs)
+        single = make(SyncVectorEnv, [partial(FlatlandEnv, **kwargs)] * n, autoreset_mode=mode)
+        assert vector.observation_space == single.observation_space
+        assert vector.action_space == single.action_space
+        assert_same(vector.reset(seed=11), single.reset(seed=11))
+        vector.action_space.seed(0)
+        count = 0
+        for _ in range(steps):
+            actions = vector.action_space.sample()
+            if actions.dtype.kind == "f":
+                actions[:, 0] = np.abs(actions[:, 0])  # Mostly forward: episodes end soon.
+            result = vector.step(actions)
+            assert_same(result, single.step(actions))
+            ended = result[2] | result[3]
+            count += ended.sum()
+            if mode is AutoresetMode.DISABLED and ended.any():
+                options = {"reset_mask": ended}
+                assert_same(vector.reset(options=options), single.reset(options=options))
+        return vector, count
+
+    return compare

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +13,6 @@ import tricycle
 from gymnasium import spaces
 from gymnasium.error import InvalidAction
 from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import SyncVectorEnv
-from nested import assert_same
 from pettingzoo.test import parallel_api_test
 
 from flatland.errors import WorldError
@@ -175,26 +172,23 @@ def test_commands_of_other_kinds_are_discrete(
     ],
 )
 def test_a_vector_equals_single_environments(
-    make: Make, worlds: dict[str, Callable[[], Path]], name: str, action: Action
+    equals_singles: Callable[..., Any],
+    worlds: dict[str, Callable[[], Path]],
+    name: str,
+    action: Action,
 ) -> None:
     numbers = len(action.columns)
-    kwargs = {
-        "world": worlds[name](),
-        "action": action,
-        "observation": Observation(Scan(), Goal(), LastAction(numbers), Velocity(numbers == 3)),
-        "reward": -1.0 * Jerkiness(),
-        "max_steps": 12,
-        "task": FixedGoal((3, 2, 0), (5, 3)),
-    }
-    envs = make(FlatlandVectorEnv, 3, num_threads=2, **kwargs)
-    single = make(SyncVectorEnv, [partial(FlatlandEnv, **kwargs)] * 3)
+    envs, _ = equals_singles(
+        3,
+        30,
+        world=worlds[name](),
+        action=action,
+        observation=Observation(Scan(), Goal(), LastAction(numbers), Velocity(numbers == 3)),
+        reward=-1.0 * Jerkiness(),
+        max_steps=12,
+        task=FixedGoal((3, 2, 0), (5, 3)),
+    )
     assert envs._episodes._batch is not None
-    assert envs.action_space == single.action_space
-    assert_same(envs.reset(seed=0), single.reset(seed=0))
-    envs.action_space.seed(0)
-    for _ in range(30):
-        actions = envs.action_space.sample()
-        assert_same(envs.step(actions), single.step(actions))
 
 
 def test_checkers_find_nothing(make: Make, worlds: dict[str, Callable[[], Path]]) -> None:

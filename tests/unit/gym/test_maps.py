@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +11,13 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from nested import assert_same
+from gymnasium.vector import AutoresetMode
 from pettingzoo.test import parallel_api_test
 
 from flatland.gym import (
     Costmap,
     FixedGoal,
     FlatlandEnv,
-    FlatlandVectorEnv,
     Goal,
     LocalMap,
     Observation,
@@ -221,22 +218,10 @@ ALL = Observation(
 
 
 @pytest.mark.parametrize("mode", list(AutoresetMode))
-def test_a_vector_equals_single_environments(make: Make, room: Path, mode: AutoresetMode) -> None:
-    n = 3
-    kwargs = {"world": room, "observation": ALL, "max_steps": 8}
-    envs = make(FlatlandVectorEnv, n, autoreset_mode=mode, num_threads=2, **kwargs)
-    single = make(SyncVectorEnv, [partial(FlatlandEnv, **kwargs)] * n, autoreset_mode=mode)
-    assert envs.observation_space == single.observation_space
-    assert_same(envs.reset(seed=1), single.reset(seed=1))
-    envs.action_space.seed(0)
-    for _ in range(30):
-        actions = envs.action_space.sample()
-        result = envs.step(actions)
-        assert_same(result, single.step(actions))
-        ended = result[2] | result[3]
-        if mode is AutoresetMode.DISABLED and ended.any():
-            options = {"reset_mask": ended}
-            assert_same(envs.reset(options=options), single.reset(options=options))
+def test_a_vector_equals_single_environments(
+    equals_singles: Callable[..., Any], room: Path, mode: AutoresetMode
+) -> None:
+    equals_singles(3, 30, mode, world=room, observation=ALL, max_steps=8)
 
 
 @pytest.mark.parametrize(

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.vector import AutoresetMode
 from nested import assert_same
 
 from flatland.errors import WorldError
@@ -21,7 +20,6 @@ from flatland.gym import (
     DriveLimits,
     FixedGoal,
     FlatlandEnv,
-    FlatlandVectorEnv,
     Friction,
     ObservationLatency,
     ObstacleSize,
@@ -85,21 +83,10 @@ def speeds(env: FlatlandEnv, seed: int, steps: int) -> list[float]:
 
 
 @pytest.mark.parametrize("mode", list(AutoresetMode))
-def test_a_vector_equals_single_environments(make: Make, mode: AutoresetMode) -> None:
-    n = 3
-    kwargs = {"world": "corridor", "max_steps": 15, "randomization": ALL}
-    vector = make(FlatlandVectorEnv, n, autoreset_mode=mode, num_threads=3, **kwargs)
-    single = make(SyncVectorEnv, [partial(FlatlandEnv, **kwargs)] * n, autoreset_mode=mode)
-    assert_same(vector.reset(seed=11), single.reset(seed=11))
-    rng = np.random.default_rng(0)
-    for _ in range(60):
-        actions = rng.uniform(-1, 1, (n, 2)).astype(np.float32)
-        result = vector.step(actions)
-        assert_same(result, single.step(actions))
-        ended = result[2] | result[3]
-        if mode is AutoresetMode.DISABLED and ended.any():
-            options = {"reset_mask": ended}
-            assert_same(vector.reset(options=options), single.reset(options=options))
+def test_a_vector_equals_single_environments(
+    equals_singles: Callable[..., Any], mode: AutoresetMode
+) -> None:
+    equals_singles(3, 60, mode, world="corridor", max_steps=15, randomization=ALL)
 
 
 def test_an_episode_depends_on_its_seed_only(make: Make) -> None:
@@ -116,14 +103,9 @@ def test_an_episode_depends_on_its_seed_only(make: Make) -> None:
             assert_same(one, other)
 
 
-def test_buildings_are_randomized(make: Make) -> None:
-    kwargs = {"world": Buildings(["corridor"] * 3), "randomization": ALL, "max_steps": 5}
-    envs = make(FlatlandVectorEnv, 4, **kwargs)
-    single = make(SyncVectorEnv, [partial(FlatlandEnv, **kwargs)] * 4)
-    assert_same(envs.reset(seed=2), single.reset(seed=2))
-    for _ in range(20):
-        actions = np.tile(FORWARD, (4, 1))
-        assert_same(envs.step(actions), single.step(actions))
+def test_buildings_are_randomized(equals_singles: Callable[..., Any]) -> None:
+    world = Buildings(["corridor"] * 3)
+    equals_singles(4, 20, world=world, max_steps=5, randomization=ALL)
 
 
 def test_robots_of_a_fleet_differ(make: Make) -> None:
