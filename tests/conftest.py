@@ -35,9 +35,9 @@ _TESTS = Path(__file__).resolve().parent
 _CHECKOUT = _TESTS.parent
 # Tests that need a ROS master, a screen or a compiler, and take a while.
 _MARKED_FOLDERS = {"ros": "ros", "ros/viewer": "viewer", "build": "build", "web": "web"}
-# Folders whose tests run in one process, since they share a workspace or a screen. The tests of
-# each other file run in one process.
-_GROUPED_FOLDERS = ("build", "ros/viewer")
+# Folders whose tests run in one process, since they share a workspace, a screen or a browser. The
+# tests of each other file run in one process.
+_GROUPED_FOLDERS = ("build", "ros/viewer", "web")
 _LISTED_GROUPS = 10
 # Groups and folders that take long, in the order in which they start, so that none is left alone at
 # the end. Those that mostly wait are among the first, beside the compiler.
@@ -45,11 +45,11 @@ _SLOW_PATHS = (
     "build",
     "ros/viewer",
     "unit/scenarios/test_stack.py",
+    "web",
     "examples/test_pages.py",
     "examples/test_navigation.py",
     "unit/cli/test_test.py",
     "examples",
-    "web",
     "ros/faults",
     "ros",
     "unit/scenarios",
