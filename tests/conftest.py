@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-# Each process of pytest-xdist imports all modules of the tests. To compile them takes three times as
-# long as the rest of that, so that processes share what each of them has compiled.
+# Each process of pytest-xdist imports all modules of the tests, most of which time it would spend
+# with their compilation. The processes share what each of them has compiled.
 sys.dont_write_bytecode = False
 
 # How fast a loaded machine is says nothing about the code. The examples are the same in each run,
