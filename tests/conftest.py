@@ -37,18 +37,19 @@ _CHECKOUT = _TESTS.parent
 _MARKED_FOLDERS = {"ros": "ros", "ros/viewer": "viewer", "build": "build", "web": "web"}
 # Folders whose tests run in one process, since they share a workspace, a screen or a browser. The
 # tests of each other file run in one process.
-_GROUPED_FOLDERS = ("build", "ros/viewer", "web")
+_GROUPED_FOLDERS = ("build/workspace", "ros/viewer", "web")
 _LISTED_GROUPS = 10
 # Groups and folders that take long, in the order in which they start, so that none is left alone at
 # the end. Those that mostly wait are among the first, beside the compiler.
 _SLOW_PATHS = (
-    "build",
+    "build/workspace",
     "ros/viewer",
     "unit/scenarios/test_stack.py",
     "web",
     "examples/test_pages.py",
     "examples/test_navigation.py",
     "unit/cli/test_test.py",
+    "build",
     "examples",
     "ros/faults",
     "ros",
