@@ -28,10 +28,10 @@ run: setup  ## run the simulator: make run [WORLD=world.yaml] [ARGS="show_viz:=f
 	@tools/run.sh "$(WORLD)" $(ARGS)
 
 # More processes than processors of a small machine, because many tests wait for programs.
-PYTEST_OPTIONS := --numprocesses 3 --dist loadgroup --no-loadscope-reorder
+PYTEST_OPTIONS := --numprocesses 4 --dist loadgroup --no-loadscope-reorder
 
 .PHONY: test
-test: setup-dev  ## run all tests, in three processes: make test [ARGS="-k laser"]
+test: setup-dev  ## run all tests, in four processes: make test [ARGS="-k laser"]
 	@. ./setup.bash && pytest $(PYTEST_OPTIONS) $(ARGS)
 
 # Ignored, although their tests have marks, because each process would import their modules.

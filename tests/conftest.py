@@ -5,11 +5,17 @@ from __future__ import annotations
 import functools
 import gc
 import os
+import sys
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+# Each process of pytest-xdist imports all modules of the tests, most of which time it would spend
+# with their compilation. The processes share what each of them has compiled.
+sys.dont_write_bytecode = False
 
 # How fast a loaded machine is says nothing about the code. The examples are the same in each run,
 # so that a change that fails has caused it; `--hypothesis-profile=random`, which
@@ -29,12 +35,26 @@ _TESTS = Path(__file__).resolve().parent
 _CHECKOUT = _TESTS.parent
 # Tests that need a ROS master, a screen or a compiler, and take a while.
 _MARKED_FOLDERS = {"ros": "ros", "ros/viewer": "viewer", "build": "build", "web": "web"}
-# Folders whose tests run in one process, since they share a workspace or a screen. The tests of
-# each other file run in one process.
-_GROUPED_FOLDERS = ("build", "ros/viewer")
+# Folders whose tests run in one process, since they share a workspace, a screen or a browser. The
+# tests of each other file run in one process.
+_GROUPED_FOLDERS = ("build/workspace", "ros/viewer", "web")
 _LISTED_GROUPS = 10
-# Folders with groups that take long; they start first, so that none is left alone at the end.
-_SLOW_FOLDERS = ("build", "ros/viewer", "web", "examples", "ros", "unit/scenarios")
+# Groups and folders that take long, in the order in which they start, so that none is left alone at
+# the end. Those that mostly wait are among the first, beside the compiler.
+_SLOW_PATHS = (
+    "build/workspace",
+    "ros/viewer",
+    "unit/scenarios/test_stack.py",
+    "web",
+    "examples/test_pages.py",
+    "examples/test_navigation.py",
+    "unit/cli/test_test.py",
+    "build",
+    "examples",
+    "ros/faults",
+    "ros",
+    "unit/scenarios",
+)
 
 
 def _group_of(path: str) -> str:
@@ -43,9 +63,29 @@ def _group_of(path: str) -> str:
 
 
 def _rank(path: str) -> int:
-    """Returns the position of a file among the slow folders, beyond them for all others."""
-    ranks = (rank for rank, folder in enumerate(_SLOW_FOLDERS) if path.startswith(f"{folder}/"))
-    return next(ranks, len(_SLOW_FOLDERS))
+    """Returns the position of a file among the slow paths, beyond them for all others."""
+    ranks = (rank for rank, slow in enumerate(_SLOW_PATHS) if f"{path}/".startswith(f"{slow}/"))
+    return next(ranks, len(_SLOW_PATHS))
+
+
+class _Folder(pytest.Dir):
+    """A folder of tests, with whose parts each process of pytest-xdist begins elsewhere.
+
+    Processes that began with the same modules would compile all of them at the same time.
+    """
+
+    def collect(self) -> Iterable[pytest.Item | pytest.Collector]:
+        """Returns the files and folders."""
+        parts = list(super().collect())
+        worker = getattr(self.config, "workerinput", {"workerid": "gw0", "workercount": 1})
+        number = int(worker["workerid"].removeprefix("gw"))
+        first = len(parts) * number // worker["workercount"]
+        return parts[first:] + parts[:first]
+
+
+def pytest_collect_directory(path: Path, parent: pytest.Collector) -> _Folder:
+    """Returns the collector of a folder."""
+    return _Folder.from_parent(parent, path=path)
 
 
 @functools.cache
@@ -59,7 +99,8 @@ def _marks_of(path: Path) -> list[pytest.MarkDecorator]:
 @pytest.hookimpl(tryfirst=True)  # before pytest-xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Marks all tests by their folder, and assigns those that share fixtures to one process."""
-    items.sort(key=lambda item: _rank(item.path.relative_to(_TESTS).as_posix()))
+    paths = {path: path.relative_to(_TESTS).as_posix() for path in {item.path for item in items}}
+    items.sort(key=lambda item: (_rank(paths[item.path]), paths[item.path]))
     for item in items:
         for mark in _marks_of(item.path):
             item.add_marker(mark)

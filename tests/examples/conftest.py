@@ -19,12 +19,6 @@ def example(checkout: Path) -> Path:
     return checkout / "examples" / "my_robots"
 
 
-@pytest.fixture
-def unused_port() -> Callable[[], int]:
-    """Returns an unused TCP port with each call, for further ROS masters."""
-    return free_port
-
-
 @pytest.fixture(scope="session")
 def new_environment(checkout: Path) -> Callable[[Path], dict[str, str]]:
     """Returns the environment of a shell after `. setup.bash`, with a new home and ROS master."""

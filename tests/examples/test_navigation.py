@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import runpy
 import shlex
 import subprocess
 import sys
@@ -469,19 +470,21 @@ def test_a_tour_reports_times_and_errors(checkout, shell, start, tour_of):
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_an_invalid_tour_is_an_error(package, tour_of, tmp_path):
+    program = runpy.run_path(str(package / "scripts" / "tour.py"))
+    file = tmp_path / "tour.yaml"
+    for text, message in (
         ("goals: []", "expected goals:"),
         ("goals: [{name: a}]", "expected goals:"),
         ("goals: [{pose: [1, 2]}]", "expected goals:"),
         ("[1, 2]", "expected goals:"),
         ("goals: [{pose: [1, 2, .nan]}]", "goal 1 is not finite"),
         ("goals: [", "expected goals:"),
-    ],
-)
-def test_an_invalid_tour_is_an_error(text, message, tour_of, tmp_path):
-    done = tour_of(text)
+    ):
+        file.write_text(text)
+        with pytest.raises(program["TourError"]) as raised:
+            program["read_tour"](file)
+        assert str(raised.value).startswith(f"{file}: {message}"), text
+    done = tour_of("goals: []")
     assert done.returncode == 1
-    assert done.stderr.startswith(f"tour: {tmp_path / 'tour.yaml'}: ")
-    assert message in done.stderr
+    assert done.stderr.startswith(f"tour: {file}: expected goals:")

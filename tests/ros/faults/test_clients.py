@@ -411,7 +411,10 @@ def test_many_connections_that_are_left_open(
         client = ServiceClient(
             tcpros_address, "/crowded/delete_model", DeleteModel, persistent=False
         )
-        return 'model with name "nobody" does not exist' in client.call("nobody").message
+        # A refused connection ends before the request is read, which may reset it.
+        with contextlib.suppress(ConnectionError):
+            return 'model with name "nobody" does not exist' in client.call("nobody").message
+        return False
 
     wait_until("a call", is_served)
     assert "Traceback" not in process.output

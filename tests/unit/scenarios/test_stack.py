@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from plugin_manifests import write_plugins
 
 pytest.importorskip("rospy", reason="ROS is not installed")
 
@@ -100,6 +101,14 @@ PACKAGE = """
   <maintainer email="test@example.com">Test</maintainer><license>BSD</license>
 </package>
 """
+SLOW_STEPS = """
+import time
+import flatland
+
+class SlowSteps(flatland.WorldPlugin):
+    def before_physics_step(self, timekeeper):
+        time.sleep(0.01)
+"""
 TEXT = "goals: [[4, 5], [4, 7]]\nlimits: {time: 30}\nrequire: [reached, no contact]\n"
 
 
@@ -162,7 +171,8 @@ def test_the_error_of_the_localization_is_measured(drive):
     assert row["outcome"] == "reached"
 
 
-def test_a_stack_that_fails_is_a_failed_run(drive):
+def test_a_stack_that_fails_is_a_failed_run(drive, monkeypatch):
+    monkeypatch.setattr("flatland.scenarios.workers.MAX_ATTEMPTS", 1)  # of the mode `kills`
     modes = ["stack.launch mode:=ends", "ends", "absent", "nan", "floods", "silent", "kills"]
     rows = dict(zip(modes, drive(*modes), strict=True))
     assert {row["outcome"] for row in rows.values()} == {"error"}
@@ -177,7 +187,7 @@ def test_a_stack_that_fails_is_a_failed_run(drive):
     assert "sent more than 200 commands per second" in errors["floods"]
     assert "sent no command for 10 s" in errors["silent"]
     # The node ends the worker process, and is ended with it.
-    assert "ended in each of 3 attempts (signal 9)" in errors["kills"]
+    assert "ended in each of 1 attempts (signal 9)" in errors["kills"]
 
 
 def test_a_stack_that_is_not_ready_in_time_is_a_failed_run(drive):
@@ -186,15 +196,15 @@ def test_a_stack_that_is_not_ready_in_time_is_a_failed_run(drive):
     assert "not ready after 2 s: no node subscribes to /elsewhere" in row["error"]
 
 
-def test_real_time_that_is_not_held_makes_a_run_invalid(drive, room):
+def test_real_time_that_is_not_held_makes_a_run_invalid(drive, room, monkeypatch):
     (row,) = drive("drive", pace="real-time")
     assert (row["outcome"], row["passed"]) == ("reached", True), row["error"]
     assert row["real_time_factor"] < 1.1
-    # A step with so many beams takes longer than 5 ms.
-    model = room / "robot.model.yaml"
-    text = model.read_text().replace("increment: 0.05", "increment: 0.000007")
-    model.write_text(text.replace("update_rate: 10\n", "update_rate: 200\n"))
-    (row,) = drive("drive", text=TEXT.replace("time: 30", "time: 2"), pace="real-time")
+    # Each step takes twice the time that it simulates.
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", write_plugins(room, SLOW_STEPS, "slow_steps"))
+    world = room / "world.yaml"
+    world.write_text(world.read_text() + "plugins: [{type: 'test::SlowSteps', name: slow}]\n")
+    (row,) = drive("drive", text=TEXT.replace("time: 30", "time: 1.5"), pace="real-time")
     assert (row["outcome"], row["success"], row["passed"]) == ("invalid", False, False)
     assert "did not hold real time" in row["failures"]
 
