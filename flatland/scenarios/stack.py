@@ -43,7 +43,7 @@ class StackError(Exception):
 
 
 class GaveUpError(Exception):
-    """The nodes have stopped to drive the robot; the text is the reason."""
+    """The nodes no longer drive the robot; the text is the reason."""
 
 
 class Stack:
@@ -228,7 +228,7 @@ class Stack:
             due = self._began + stage.time - self._began_at
             time.sleep(max(0.0, due - time.monotonic()))
             return
-        # A stack that has stopped to send commands is not waited for: it gets real time.
+        # A stack that no longer sends commands is not waited for: it gets real time.
         self._link.wait(stage.task.period if self._is_silent else _PATIENCE)
 
     def _check_program(self) -> None:
