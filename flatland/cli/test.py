@@ -357,6 +357,8 @@ def _print(
         if worst.recording:
             print(f"flatland replay {options.out / worst.recording} --view")
     print(f"\nreport: {options.out / 'report.html'}")
+    if any(result.recording for result in results.results):
+        print(f"with links that replay the runs: flatland replay {options.out} --view")
 
 
 def _exit_code(

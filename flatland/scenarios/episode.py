@@ -22,7 +22,7 @@ from flatland.scenarios.events import Events
 from flatland.scenarios.measures import Measures, distance_left, success_weighted_length
 from flatland.scenarios.outline import outline_of
 from flatland.scenarios.planner import PlanningError, shortest_length
-from flatland.scenarios.stack import Stack, StackError, opened
+from flatland.scenarios.stack import GaveUpError, Stack, StackError, opened
 from flatland.scenarios.stack_options import StackCommand, StackOptions
 from flatland.scenarios.stage import Stage, drive_topic, prepare
 from flatland.scenarios.worlds import world_file
@@ -265,7 +265,7 @@ def _drive(scenario: Scenario, stage: Stage, driver: _Driver, result: Result) ->
     last = max(1, round(limits.time / step_size))
     steps_per_period = max(1, round(stage.task.period / step_size))
     events, measures = Events(scenario, stage), Measures(stage)
-    reached, outcome, steps = 0, "", 0
+    reached, outcome, steps, reason = 0, "", 0, None
     start = time.perf_counter()
     try:
         while not outcome:
@@ -291,6 +291,8 @@ def _drive(scenario: Scenario, stage: Stage, driver: _Driver, result: Result) ->
             outcome = _outcome(scenario, measures, reached, len(goals))
             if not outcome and steps >= last:
                 outcome = "timeout"
+    except GaveUpError as error:
+        outcome, reason = "gave_up", str(error)
     finally:
         wall_time = time.perf_counter() - start
         measures.sample()
@@ -299,6 +301,7 @@ def _drive(scenario: Scenario, stage: Stage, driver: _Driver, result: Result) ->
         result.row |= {
             "outcome": outcome,
             "success": outcome == "reached",
+            "error": reason,
             "goals": reached,
             "time": stage.time,
             "start_x": stage.start[0],
@@ -317,8 +320,9 @@ def _drive(scenario: Scenario, stage: Stage, driver: _Driver, result: Result) ->
     result.row |= _efficiency(stage, result.row)
     people = frozenset(measures.people)
     failures = [condition.failure(result.row, people) for condition in scenario.require]
-    result.row["failures"] = "; ".join(filter(None, failures)) or None
     result.row["passed"] = not any(failures)
+    if any(failures):
+        result.row["failures"] = "; ".join(filter(None, [*failures, reason]))
 
 
 def _outcome(scenario: Scenario, measures: Measures, reached: int, goals: int) -> str:

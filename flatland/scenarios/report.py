@@ -70,7 +70,7 @@ def write_report(results: SuiteResults, report: Report, path: Path) -> None:
     text = (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        '<meta name="color-scheme" content="light dark">'
+        '<meta name="color-scheme" content="light dark"><link rel="icon" href="data:,">'
         f"<title>flatland test</title><style>{style}</style></head>\n"
         f"<body><main>{chr(10).join(filter(None, body))}</main></body></html>\n"
     )
@@ -207,7 +207,14 @@ def _runs_section(results: SuiteResults, runs: Sequence[Result], folder: Path) -
     rest = ""
     if len(runs) > len(shown):
         rest = f"<p>The other {len(runs) - len(shown)} runs are in results.csv.</p>"
-    return f'<h2>Runs, the worst ones first</h2><div class="runs">{cards}</div>{rest}'
+    note = ""
+    if any(result.recording for result in shown):
+        command = escape(shlex.join(["flatland", "replay", str(folder), "--view"]))
+        note = (
+            f"<p><code>{command}</code> shows this report with links that replay the runs in the "
+            "viewer. Without it, a link opens the file of the recording.</p>"
+        )
+    return f'<h2>Runs, the worst ones first</h2>{note}<div class="runs">{cards}</div>{rest}'
 
 
 def _card(results: SuiteResults, result: Result, folder: Path) -> str:
@@ -233,10 +240,9 @@ def _replay(result: Result, folder: Path) -> str:
     if not result.recording:
         return ""
     command = shlex.join(["flatland", "replay", str(folder / result.recording), "--view"])
+    # When the report is served, this address leads to the viewer.
     link = escape(result.recording, quote=True)
-    return (
-        f'<p>Replay: <a href="{link}" download>recording</a><br><code>{escape(command)}</code></p>'
-    )
+    return f'<p><a href="{link}">Replay</a><br><code>{escape(command)}</code></p>'
 
 
 def _value(row: Row, name: str) -> str:

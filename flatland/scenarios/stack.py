@@ -42,6 +42,10 @@ class StackError(Exception):
     """The nodes do not drive the robot; the text is the reason."""
 
 
+class GaveUpError(Exception):
+    """The nodes no longer drive the robot; the text is the reason."""
+
+
 class Stack:
     """A controller that consists of ROS nodes.
 
@@ -67,7 +71,7 @@ class Stack:
         self._stage: Stage | None = None
         self._goal: Vector2 | None = None
         self._twist = Twist()
-        self._is_silent = False
+        self._is_silent = self._has_driven = False
         self._last_command = 0.0  # s of simulated time
         self._counts: deque[int] = deque()
         self._began = math.nan  # wall and simulated time of the first command [s]
@@ -131,6 +135,7 @@ class Stack:
 
         Raises:
             StackError: The program has ended, or the nodes send too many or no commands.
+            GaveUpError: The nodes have ended the goal or send no more commands.
         """
         stage = self._require_stage()
         if math.isnan(self._began):
@@ -148,12 +153,15 @@ class Stack:
         self._check_count(count, stage.task.period)
         now = stage.time
         if count:
-            self._twist, self._last_command = twist, now
+            self._twist, self._last_command, self._has_driven = twist, now, True
         else:
             self._late += 1
+        if self._link.given_up:
+            raise GaveUpError(self._link.given_up)
         silent_for = now - self._last_command
         if silent_for > _SILENCE:
-            raise StackError(f"the stack sent no command for {_SILENCE:g} s{self._log()}")
+            kind = GaveUpError if self._has_driven else StackError
+            raise kind(f"the stack sent no command for {_SILENCE:g} s{self._log()}")
         self._is_silent = not count
         return Twist() if silent_for > _WATCHDOG else self._twist
 
@@ -166,6 +174,11 @@ class Stack:
             "max_localization_error": max(errors, default=None),
             "late_commands": self._late,
         }
+
+    @property
+    def recoveries(self) -> int:
+        """Number of recovery behaviours that the action of the goals has begun."""
+        return self._link.recoveries
 
     @property
     def invalid(self) -> str:
@@ -215,7 +228,7 @@ class Stack:
             due = self._began + stage.time - self._began_at
             time.sleep(max(0.0, due - time.monotonic()))
             return
-        # A stack that has stopped to send commands is not waited for: it gets real time.
+        # A stack that no longer sends commands is not waited for: it gets real time.
         self._link.wait(stage.task.period if self._is_silent else _PATIENCE)
 
     def _check_program(self) -> None:

@@ -25,6 +25,8 @@ _MAP_RESOLUTION: Final = 0.05  # of a layer without an image [m]
 _POSITION_VARIANCE: Final = 0.01  # of the initial pose [m^2]
 _ANGLE_VARIANCE: Final = 0.01  # [rad^2]
 _REGISTRATION_TIMEOUT: Final = 5.0  # s
+_UNSUCCESSFUL: Final = {2: "preempted", 4: "aborted", 5: "rejected", 8: "recalled"}
+"""Final states of actionlib_msgs/GoalStatus without success."""
 
 Route = Callable[[str, Callable[[Any], object]], Callable[[Any], object]]
 """Returns what receives the messages of a topic, from its name and what would receive them."""
@@ -59,7 +61,8 @@ class StackLink(WorldObserver):
         self._goals: Publisher | None = None
         self._initial_pose: Publisher | None = None
         self._has_action = threading.Event()
-        self._goal_number = 0
+        self._goal_number = self._recoveries = 0
+        self._given_up = ""
 
     def close(self) -> None:
         """Ends the clock."""
@@ -95,7 +98,12 @@ class StackLink(WorldObserver):
             self.transport.subscribe(
                 f"{action}/status",
                 message_class("actionlib_msgs/GoalStatusArray"),
-                lambda _message: self._has_action.set(),
+                self._receive_status,
+            )
+            self.transport.subscribe(
+                f"{action}/recovery_status",
+                message_class("move_base_msgs/RecoveryStatus"),
+                self._receive_recovery,
             )
         self.transport.flush(_REGISTRATION_TIMEOUT)
 
@@ -144,11 +152,39 @@ class StackLink(WorldObserver):
         target = message
         if action:
             self._goal_number += 1
-            message.goal_id.id = f"flatland-{self._goal_number}"
+            self._given_up = ""
+            message.goal_id.id = self._goal_id
             target = message.goal.target_pose
         target.header.frame_id = WORLD_FRAME
         _set_pose(target.pose, (*goal, yaw))
         self._goals.publish(message)
+
+    @property
+    def given_up(self) -> str:
+        """Why the action ended the current goal without success; empty if it has not."""
+        return self._given_up
+
+    @property
+    def recoveries(self) -> int:
+        """Number of recovery behaviours that the action has begun."""
+        return self._recoveries
+
+    @property
+    def _goal_id(self) -> str:
+        return f"flatland-{self._goal_number}"
+
+    def _receive_status(self, message: Any) -> None:
+        """Receives the states of all goals of the action; called in any thread."""
+        self._has_action.set()
+        for one in message.status_list:
+            if one.goal_id.id == self._goal_id and one.status in _UNSUCCESSFUL:
+                verb, text = _UNSUCCESSFUL[one.status], one.text
+                reason = f"{self._options.goal_action} {verb} the goal"
+                self._given_up = f"{reason}: {text}" if text else reason
+
+    def _receive_recovery(self, _message: Any) -> None:
+        """Counts a recovery behaviour; called in the thread of the connection."""
+        self._recoveries += 1
 
     # -- commands --------------------------------------------------------------------------
 

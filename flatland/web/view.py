@@ -72,6 +72,11 @@ class LiveView(WorldObserver):
         """Whether the view has ended."""
         return self._closed
 
+    @property
+    def is_watched(self) -> bool:
+        """Whether a browser shows the world."""
+        return self._viewer.is_watched
+
     def close(self) -> None:
         """Stops the server, not the world; further calls have no effect."""
         if self._closed:

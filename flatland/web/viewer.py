@@ -131,6 +131,12 @@ class WebViewer:
         """Token that clients must send, None if no token is required."""
         return self._access.token
 
+    @property
+    def is_watched(self) -> bool:
+        """Whether a browser shows a world."""
+        with self._lock:
+            return any(not feed.audience.empty for feed, _ in self._shown.values())
+
     # -- start and end ---------------------------------------------------------------------
 
     def start(self) -> None:

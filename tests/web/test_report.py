@@ -1,13 +1,23 @@
-"""The report of `flatland test` in a browser, in light and dark."""
+"""The report of `flatland test` in a browser, in light and dark, and its links to replays."""
 
 from __future__ import annotations
 
+import json
+import signal
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
 from chromium import PHONE, Chromium
+from flatland_command import main
+from programs import Program
+from viewer_page import ViewerPage
+from waiting import TIMEOUT
 
 from flatland.scenarios.columns import empty_row, error_row
 from flatland.scenarios.comparison import compare
@@ -92,3 +102,97 @@ def test_the_page_is_not_wider_than_a_phone(report: Chromium) -> None:
         assert report.evaluate("document.documentElement.scrollWidth") == PHONE[0]
     finally:
         report.resize(1200, 1600)
+
+
+# -- replays -------------------------------------------------------------------------------
+
+SCENARIO = """
+world: world.yaml
+goal: [8, 5]
+limits: {time: 3}
+"""
+WORLD = """
+properties: {}
+layers: []
+models: [{name: robot, model: robot.model.yaml, pose: [3, 5, 0]}]
+"""
+ROBOT = """
+bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 100}]}]
+plugins:
+- {type: DiffDrive, name: drive, body: base}
+- {type: Laser, name: eye, body: base, range: 9, angle: {min: -3, max: 3, increment: 0.1}}
+"""
+
+
+@pytest.fixture
+def suite(tmp_path: Path) -> Path:
+    """A folder with the results of two runs that fail, in the folder `out`."""
+    (tmp_path / "world.yaml").write_text(WORLD)
+    (tmp_path / "robot.model.yaml").write_text(ROBOT)
+    (tmp_path / "s.yaml").write_text(SCENARIO)
+    options = ("--robot", "straight", "--seeds", "0:2", "--workers", "1")
+    assert main("test", tmp_path / "s.yaml", *options, "--out", tmp_path / "out") == 1
+    return tmp_path
+
+
+@pytest.fixture
+def server(suite: Path) -> Iterator[Program]:
+    """The command that serves the report."""
+    command = [sys.executable, "-m", "flatland", "replay", suite / "out", "--view"]
+    server = Program(command)
+    yield server
+    server.process.send_signal(signal.SIGINT)
+    assert server.process.wait(TIMEOUT) == 130, server.output
+
+
+def address_of(server: Program) -> str:
+    """Returns the address that the command has printed."""
+    return server.wait_for_line(r"report\.html is shown at (http://\S+)")[1]
+
+
+def status_of(request: Request | str) -> tuple[int, str]:
+    """Returns the status and the text of the response to a request that is not permitted."""
+    with pytest.raises(HTTPError) as raised:
+        urlopen(request, timeout=TIMEOUT)
+    return raised.value.code, raised.value.read().decode()
+
+
+def test_a_link_replays_its_run_in_the_viewer(
+    suite: Path, server: Program, browser: Chromium
+) -> None:
+    report = address_of(server)
+    runs = json.loads((suite / "out" / "results.json").read_text())["runs"]
+    _time, x, y = runs[0]["path"][-1]
+    browser.console()
+    viewers = []
+    # Each click starts another replay.
+    for _ in range(2):
+        browser.open(report)
+        browser.click(f"a[href='{runs[0]['recording']}']")
+        page = ViewerPage(browser)
+        page.wait_until_shown()
+        # The end remains visible.
+        browser.until("flatland.state.worlds[0].time > 2.99")
+        page.wait_for_poses({"robot": (x, y, 0.0)})
+        viewers.append(browser.driver.current_url)
+    assert viewers[0] != viewers[1]
+    assert browser.console() == []
+    server.wait_for_line(r"(?s)no difference.*no difference")
+
+
+def test_a_recording_that_cannot_be_replayed_is_named(suite: Path, server: Program) -> None:
+    report = address_of(server)
+    (suite / "robot.model.yaml").write_text(ROBOT + "# changed\n")
+    (recording, _) = (suite / "out" / "recordings").iterdir()
+    link = report.replace("report.html", f"recordings/{recording.name}")
+    code, text = status_of(link)
+    assert code == 409
+    assert "files have changed since the recording" in text
+    assert "robot.model.yaml" in text
+
+
+def test_pages_of_other_sites_receive_nothing(server: Program) -> None:
+    report = address_of(server)
+    assert status_of(Request(report, headers={"Host": "site.example"}))[0] == 403
+    assert status_of(report.replace("report.html", "recordings/missing.flog"))[0] == 404
+    assert status_of(report.replace("report.html", "../s.yaml"))[0] == 404

@@ -65,7 +65,8 @@ class Gap:
     It has no map: dead ends on the way to the goal trap it.
     """
 
-    _DISTANCE: Final = 2.5  # that is to be free [m]
+    # Longer distances exclude doors and bends of corridors.
+    _DISTANCE: Final = 1.0  # that is to be free [m]
     _MARGIN: Final = 0.1  # distance to obstacles [m]
 
     def __init__(self, task: Task) -> None:

@@ -80,6 +80,22 @@ def test_a_missing_recording_is_an_error(
     assert "No such file" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ((), "a folder of results requires --view"),
+        (("--view", "--bag", "a.bag"), "a folder of results requires --view, without --bag"),
+        (("--view",), "contains no report.html of `flatland test`"),
+    ],
+)
+def test_a_folder_must_contain_a_report(
+    options: tuple[str, ...], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main("replay", tmp_path, *options)
+    assert message in capsys.readouterr().err
+
+
 def test_the_bag_of_a_replay_is_that_of_the_run(world: str) -> None:
     rosbag = pytest.importorskip("rosbag")
     arguments = ("run", world, "--duration", "0.5", "--seed", "1", *DRIVE)

@@ -95,6 +95,7 @@ def test_a_failed_run_is_drawn_and_can_be_replayed(suite, capsys):
     assert re.search(r"http://127\.0\.0\.1:\d+/", printed.out + printed.err)
     assert "no difference" in printed.out
     assert (suite / "j.xml").is_file()
+    assert "with links that replay the runs: flatland replay out --view" in output
 
 
 def test_a_baseline_decides_on_the_exit_code(suite, capsys):

@@ -204,13 +204,15 @@ def test_the_report_is_one_file(results, tmp_path):
     write_report(results, report, tmp_path / "report.html")
     page = Page((tmp_path / "report.html").read_text().replace("<!DOCTYPE html>", ""))
     tags = [tag for tag, _ in page.elements]
-    assert {"script", "link", "img", "iframe"}.isdisjoint(tags)
+    assert {"script", "img", "iframe"}.isdisjoint(tags)
+    assert [attributes["href"] for tag, attributes in page.elements if tag == "link"] == ["data:,"]
     assert tags.count("article") == 3
     links = [attributes["href"] for tag, attributes in page.elements if tag == "a"]
     assert links == ["recordings/a.flog"]
     assert "1 of 3 runs passed, 1 with an error" in page.texts
     assert "<reached> & more" in page.texts
     assert f"flatland replay {tmp_path}/recordings/a.flog --view" in page.texts
+    assert f"flatland replay {tmp_path} --view shows this report" in page.texts
     assert "kidnap at 0.50 s" in page.texts
     assert "worse" in page.texts
     first = page.texts.index("no <way>")

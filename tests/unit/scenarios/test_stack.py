@@ -26,7 +26,9 @@ pytestmark = pytest.mark.ros
 NODE = """
 import math, os, signal, subprocess, sys, threading, time
 import rospy, tf2_ros
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped, Twist
+from move_base_msgs.msg import MoveBaseActionGoal, RecoveryStatus
 from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import LaserScan
 
@@ -38,6 +40,7 @@ rospy.init_node("driver")
 transforms = tf2_ros.Buffer()
 listener = tf2_ros.TransformListener(transforms)
 goal = None
+count = 0
 commands = rospy.Publisher("cmd_vel", Twist, queue_size=1)
 if mode == "localizes":
     sender = tf2_ros.StaticTransformBroadcaster()
@@ -47,6 +50,17 @@ if mode == "localizes":
     sender.sendTransform(found)
 if mode == "leaves":
     subprocess.Popen(["setsid", "sleep", "4321.5"])
+
+def on_action_goal(message):
+    status.status_list = [GoalStatus(message.goal_id, GoalStatus.ACTIVE, "")]
+    status_publisher.publish(status)
+    on_goal(message.goal.target_pose)
+
+def abort():
+    recoveries.publish(RecoveryStatus())
+    status.status_list[0].status = GoalStatus.ABORTED
+    status.status_list[0].text = "no valid plan"
+    status_publisher.publish(status)
 
 def on_goal(message):
     global goal
@@ -64,7 +78,12 @@ def flood():
         commands.publish(Twist())
 
 def on_scan(scan):
-    if goal is None or mode == "silent":
+    global count
+    if goal is None or mode == "silent" or (mode in ("stops", "aborts") and count > 5):
+        return
+    count += 1
+    if mode == "aborts" and count > 5:
+        abort()
         return
     command = Twist()
     # In wall time: the simulated time waits for the command.
@@ -85,7 +104,16 @@ def on_scan(scan):
 # The map and the pose of the start arrive before the goal is accepted.
 rospy.wait_for_message("map", OccupancyGrid)
 rospy.wait_for_message("initialpose", PoseWithCovarianceStamped)
-rospy.Subscriber("move_base_simple/goal", PoseStamped, on_goal)
+if mode == "aborts":
+    status = GoalStatusArray()
+    recoveries = rospy.Publisher("move_base/recovery_status", RecoveryStatus, queue_size=1)
+    status_publisher = rospy.Publisher(
+        "move_base/status", GoalStatusArray, queue_size=5, latch=True
+    )
+    status_publisher.publish(status)
+    rospy.Subscriber("move_base/goal", MoveBaseActionGoal, on_action_goal)
+else:
+    rospy.Subscriber("move_base_simple/goal", PoseStamped, on_goal)
 rospy.Subscriber("scan", LaserScan, on_scan)
 rospy.spin()
 """
@@ -188,6 +216,23 @@ def test_a_stack_that_fails_is_a_failed_run(drive, monkeypatch):
     assert "sent no command for 10 s" in errors["silent"]
     # The node ends the worker process, and is ended with it.
     assert "ended in each of 1 attempts (signal 9)" in errors["kills"]
+
+
+def test_a_stack_that_gives_up_has_failed(drive):
+    (aborted,) = drive("aborts", goal_action="move_base")
+    assert (aborted["outcome"], aborted["passed"]) == ("gave_up", False), aborted["error"]
+    assert aborted["error"] == "move_base aborted the goal: no valid plan"
+    assert aborted["recoveries"] == 1
+    reason = "reached: the outcome is gave_up; move_base aborted the goal: no valid plan"
+    assert aborted["failures"] == reason
+    # The measures are those until then.
+    assert 0 < aborted["time"] < 5
+    assert aborted["steps"] > 0
+    (silent,) = drive("stops", text=TEXT.replace("[reached, no contact]", "[no contact]"))
+    assert (silent["outcome"], silent["success"]) == ("gave_up", False), silent["error"]
+    assert silent["error"] == "the stack sent no command for 10 s"
+    # As for a time limit, only the conditions decide.
+    assert (silent["passed"], silent["failures"]) == (True, None)
 
 
 def test_a_stack_that_is_not_ready_in_time_is_a_failed_run(drive):

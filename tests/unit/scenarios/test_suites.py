@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -133,3 +134,23 @@ def test_the_workflows_of_the_page_are_valid(page):
         options = make_parser().parse_args(command.split()[1:])
         assert options.baseline == Path("baseline.json")
         assert scenario_files(options.paths)
+        for step in steps:
+            subprocess.run(["bash", "-n", "-c", step.get("run", "")], check=True)
+
+
+def test_the_packages_of_the_workflow_are_a_list_of_names(page, checkout):
+    """The workflow passes the file to apt-get by this command."""
+    assert "sed 's/#.*//' packages.txt" in page
+    file = checkout / "examples" / "navigation" / "packages-apt.txt"
+    output = subprocess.run(["sed", "s/#.*//", file], check=True, capture_output=True, text=True)
+    names = output.stdout.split()
+    assert len(names) == len(set(names)) > 20
+    assert all(re.fullmatch(r"[a-z0-9][a-z0-9+.-]+", name) for name in names)
+    # What a stack needs at run time is what flatland's own node needs.
+    own = {
+        line.split()[1]
+        for line in (checkout / "packages-apt.txt").read_text().splitlines()
+        if re.match(r"(run|dev) ", line)
+    }
+    later = output.stdout.partition("python3-venv")[2].split()
+    assert set(later) <= own
