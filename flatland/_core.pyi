@@ -1774,8 +1774,8 @@ class OldManifold:
     def tangent_impulses(self) -> npt.NDArray[np.float64]:
         """Impulse along the surface at each point [N s], shape (k,)."""
 
-def changed_contents(entries: Sequence[tuple[Any, ...]], missing: object) -> list[int]:
-    """Returns the indices of the objects whose contents are not the same objects as earlier.
+def restore_contents(entries: Sequence[tuple[Any, ...]], missing: object) -> list[int]:
+    """Writes the attributes of objects back that are not the same objects as earlier.
 
     Args:
         entries: For each object a tuple: the object; a copy of its `__dict__`, or None if it has none;
@@ -1783,6 +1783,9 @@ def changed_contents(entries: Sequence[tuple[Any, ...]], missing: object) -> lis
             values; a copy of its items, None if it is not a container. The items of a dict are in a
             dict.
         missing: Value of a slot that is not set.
+
+    Returns:
+        The indices of the containers that have changed, of which nothing is written.
 
     Raises:
         ValueError: An entry has another number of members.
