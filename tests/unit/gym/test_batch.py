@@ -256,3 +256,25 @@ def test_an_exception_while_worlds_step_leaves_them_complete(make: Make, room: P
     assert [world.time for world in env.worlds] == pytest.approx([0.1, 0.0, 0.1])
     env.step(actions)
     assert [world.time for world in env.worlds] == pytest.approx([0.2, 0.1, 0.2])
+
+
+def test_the_core_observes_other_agents_while_worlds_step(make: Make, room: Path) -> None:
+    env, commands, ones = begun(make, room)
+    batch, situation = env._episodes._batch, env.episodes.situation
+    acting = np.array([True, False, True])
+    core = batch._core
+    with pytest.raises(ValueError, match="has not begun"):
+        core.observe([1])
+
+    def meanwhile() -> None:
+        situation.poses[1] = situation.ranges[1] = np.nan
+        core.observe([1])
+        assert np.isfinite(situation.ranges[1]).all()
+        assert situation.poses[1].tolist() == list(env.episodes.agents[1].body.pose)
+        with pytest.raises(ValueError, match="steps, or is observed already"):
+            core.observe([0])
+        with pytest.raises(IndexError, match="no such agent"):
+            core.observe([COUNT])
+
+    assert batch.perform(commands, acting, 20, meanwhile).tolist() == []
+    assert batch.perform(commands, ones, 20, lambda: None).tolist() == []
