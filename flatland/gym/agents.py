@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from flatland.world import World
 
 
-# Their subclasses may do something else with a command.
+# Subclasses of these, and of Laser, may do something else with a command or in their first update.
 _DRIVES = (AckermannDrive, DiffDrive, OmniDrive, TricycleDrive)
 _STEERED = (AckermannDrive, TricycleDrive)
 
@@ -66,6 +66,19 @@ class Agent:
     drive: object
     max_speed: float
     max_yaw_rate: float
+
+
+def omit_first_calls(agents: Iterable[Agent]) -> None:
+    """Makes the core perform the first updates of lasers and drives, too, if nothing wants them.
+
+    The results are the same; an episode begins without calls of Python.
+
+    Args:
+        agents: Agents, the worlds of which have not been stepped.
+    """
+    for agent in agents:
+        known = [plugin for plugin in agent.model.plugins if type(plugin) in (Laser, *_DRIVES)]
+        agent.world.plugin_host.jobs.omit_first_calls(known)
 
 
 def find_agent(world: World, name: str, laser: str | None, command: str | None) -> Agent:

@@ -14,6 +14,8 @@ from gymnasium.vector import AutoresetMode
 from flatland.errors import StaleHandleError, WorldError, WorldLockedError
 from flatland.gym import FlatlandVectorEnv
 from flatland.gym.endings import Arrived
+from flatland.plugins.laser import Laser
+from flatland.runtime.jobs import Jobs
 from flatland.runtime.observer import WorldObserver
 from flatland.values import Twist
 
@@ -127,6 +129,33 @@ def test_the_core_performs_all_steps_alone_after_those_with_first_updates(
     assert batch.perform(commands, ones, 20, lambda: None).tolist() == [1]
     env._stage.worlds[2].physics.pre_solve = lambda *_: None
     assert batch.perform(commands, ones, 20, lambda: None).tolist() == [1, 2]
+
+
+def test_first_updates_without_calls_have_the_same_results(
+    make: Make, room: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    env = create(make, room)
+    monkeypatch.setattr(Jobs, "omit_first_calls", lambda *_: None)
+    called = create(make, room)
+    assert run(env) == run(called)
+
+
+def test_a_first_update_is_called_if_it_is_wanted(make: Make, room: Path) -> None:
+    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived())
+    env.reset(seed=0)
+    first, second = (agent.laser for agent in env.episodes.agents[:2])
+    calls: list[Laser] = []
+    for laser in (first, second):
+        laser._update.function = lambda _, laser=laser: calls.append(laser)
+    (output,) = second._update.outputs
+    unsubscribe = output.subscribe(lambda _: None)
+    env.step(np.zeros((COUNT, 2)))
+    count = len(calls)
+    assert calls == [second] * count
+    assert count > 0
+    unsubscribe()
+    env.step(np.zeros((COUNT, 2)))
+    assert len(calls) == count
 
 
 def test_a_refused_call_of_the_core_advances_no_world(make: Make, room: Path) -> None:
