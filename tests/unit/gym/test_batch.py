@@ -131,12 +131,13 @@ def test_the_core_performs_all_steps_alone_after_those_with_first_updates(
     assert batch.perform(commands, ones, 20, lambda: None).tolist() == [1, 2]
 
 
+@pytest.mark.parametrize("world", ["room", "crowd"])
 def test_first_updates_without_calls_have_the_same_results(
-    make: Make, room: Path, monkeypatch: pytest.MonkeyPatch
+    make: Make, room: Path, world: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    env = create(make, room)
+    env = create(make, room if world == "room" else world)
     monkeypatch.setattr(Jobs, "omit_first_calls", lambda *_: None)
-    called = create(make, room)
+    called = create(make, room if world == "room" else world)
     assert run(env) == run(called)
 
 
