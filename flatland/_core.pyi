@@ -1774,8 +1774,8 @@ class OldManifold:
     def tangent_impulses(self) -> npt.NDArray[np.float64]:
         """Impulse along the surface at each point [N s], shape (k,)."""
 
-def changed_contents(entries: Sequence[tuple[Any, ...]], missing: object) -> list[int]:
-    """Returns the indices of the objects whose contents are not the same objects as earlier.
+def restore_contents(entries: Sequence[tuple[Any, ...]], missing: object) -> list[int]:
+    """Writes the attributes of objects back that are not the same objects as earlier.
 
     Args:
         entries: For each object a tuple: the object; a copy of its `__dict__`, or None if it has none;
@@ -1783,6 +1783,9 @@ def changed_contents(entries: Sequence[tuple[Any, ...]], missing: object) -> lis
             values; a copy of its items, None if it is not a container. The items of a dict are in a
             dict.
         missing: Value of a slot that is not set.
+
+    Returns:
+        The indices of the containers that have changed, of which nothing is written.
 
     Raises:
         ValueError: An entry has another number of members.
@@ -1925,6 +1928,8 @@ class AgentRows:
         speed: npt.ArrayLike,
         yaw_rate: npt.ArrayLike,
         arrived: npt.ArrayLike,
+        previous_distance: npt.ArrayLike,
+        collided: npt.ArrayLike,
         ranges: npt.ArrayLike,
     ) -> None:
         """Keeps the arrays, which are those of a `flatland.gym.Situation`.
@@ -1969,6 +1974,20 @@ class AgentRows:
 
         Raises:
             ValueError: `out` has another shape.
+        """
+    def rewards(self, terms: Sequence[tuple[int, float]]) -> npt.NDArray[np.float64]:
+        """Returns the sums of rewarded quantities, each multiplied by a factor.
+
+        Args:
+            terms: Quantities and factors, which are added up in this order. The quantities are 0: how much
+                closer to the goal the agent is than before the step [m], 1: whether it has arrived,
+                2: whether it collided, 3: the number 1.
+
+        Returns:
+            The rewards, shape (n,).
+
+        Raises:
+            ValueError: There is no such quantity.
         """
 
 class AgentBatch:
@@ -2066,6 +2085,19 @@ class AgentBatch:
 
         Raises:
             ValueError: An array has another shape, a number is out of range, or `finish` was not called.
+            StaleHandleError: A world is closed.
+            WorldLockedError: A world is in use.
+        """
+    def observe(self, rows: Sequence[int]) -> None:
+        """Observes agents between `start` and `finish` that neither step nor are observed by these.
+
+        Args:
+            rows: Indices of the agents.
+
+        Raises:
+            IndexError: There is no such agent.
+            ValueError: `start` was not called, it concerns one of the agents, or the pose of an agent is
+                out of range.
             StaleHandleError: A world is closed.
             WorldLockedError: A world is in use.
         """

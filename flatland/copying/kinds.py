@@ -93,7 +93,7 @@ class Kind:
         """Writes contents back into an object."""
 
     def compared(self, obj: Any, content: Any) -> tuple[Any, ...] | None:  # noqa: ARG002
-        """Returns what `flatland.physics.changed_contents` compares; None to write in any case."""
+        """Returns what `flatland.physics.restore_contents` compares; None to write in any case."""
         return None
 
     def new(self, obj: Any) -> Any:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from flatland.copying.kinds import MISSING, Kind, kind_of
-from flatland.physics import changed_contents
+from flatland.physics import restore_contents
 
 
 class SavedObjects:
@@ -78,7 +78,7 @@ class SavedObjects:
         Returns:
             The first exception of a `__setstate__`, None if there was none.
         """
-        for index in changed_contents(self._contents, MISSING):
+        for index in restore_contents(self._contents, MISSING):
             kind, obj, content = self._compared[index]
             kind.put(obj, content)
         for kind, obj, content in self._entries:

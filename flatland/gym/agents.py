@@ -21,6 +21,7 @@ from flatland.plugins.ackermann_drive import AckermannDrive
 from flatland.plugins.diff_drive import DiffDrive
 from flatland.plugins.laser import Laser
 from flatland.plugins.omni_drive import OmniDrive
+from flatland.plugins.pedestrians import Pedestrians
 from flatland.plugins.tricycle_drive import TricycleDrive
 from flatland.values import Twist
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from flatland.world import World
 
 
-# Their subclasses may do something else with a command.
+# Their subclasses may do something else with a command or in their first update.
 _DRIVES = (AckermannDrive, DiffDrive, OmniDrive, TricycleDrive)
 _STEERED = (AckermannDrive, TricycleDrive)
 
@@ -66,6 +67,19 @@ class Agent:
     drive: object
     max_speed: float
     max_yaw_rate: float
+
+
+def omit_first_calls(world: World) -> None:
+    """Makes the core perform the first updates of a world, too, as far as nothing wants them.
+
+    The results are the same; an episode begins without calls of included plugins.
+
+    Args:
+        world: A world that has not been stepped.
+    """
+    plugins = [*world.plugins, *(plugin for model in world.models for plugin in model.plugins)]
+    kinds = (Laser, Pedestrians, *_DRIVES)
+    world.plugin_host.jobs.omit_first_calls([each for each in plugins if type(each) in kinds])
 
 
 def find_agent(world: World, name: str, laser: str | None, command: str | None) -> Agent:

@@ -122,8 +122,10 @@ class Batch:
                 alone = alone.copy()
                 alone[others] = False
             self._start(commands, alone, alone, n)
+            idle: list[int] = [] if acting is None else np.flatnonzero(~acting).tolist()
             try:
                 meanwhile()
+                idle = self._observe_beside(idle)
             finally:
                 unfinished = self._finish(alone)
                 if alone is self._all:
@@ -137,8 +139,19 @@ class Batch:
             step_agents(agents, commands[others], n, self._num_threads)
         for row in (*others, *unfinished):
             self._situation.collided[row] = self._agents[row].touches.touched
-        idle = [] if acting is None else np.flatnonzero(~acting).tolist()
         return self._observe([*unfinished, *idle], others)
+
+    def _observe_beside(self, rows: list[int]) -> list[int]:
+        """Observes agents that do not act, while others step; returns those that remain."""
+        agents = self._agents
+        chosen = [row for row in rows if not agents[row].world.physics.has_materials]
+        noisy = [row for row in chosen if row in self._noisy]
+        for row in noisy:
+            self._noises[row] = agents[row].laser.next_computed
+        self._core.observe(chosen)
+        for row in noisy:
+            agents[row].laser.count_computed()
+        return [row for row in rows if row not in chosen]
 
     def _observe(self, rows: Sequence[int], others: Sequence[int]) -> Rows:
         """Observes agents; returns those for which the core cannot do this, and others."""

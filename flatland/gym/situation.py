@@ -109,6 +109,8 @@ class Situation:
                 speed=self.speed,
                 yaw_rate=self.yaw_rate,
                 arrived=self.arrived,
+                previous_distance=self.previous_distance,
+                collided=self.collided,
                 ranges=self.ranges,
             )
         return self._core

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from flatland.gym.agents import omit_first_calls
+
 if TYPE_CHECKING:
     from flatland.gym.agents import Agent
     from flatland.runtime.snapshot import WorldSnapshot
@@ -55,6 +57,7 @@ class Stock:
     def prepare(self, world: World) -> PreparedWorld:
         """Prepares the original or a copy, which has not changed."""
         agents = tuple(self._find_agents(world))
+        omit_first_calls(world)
         start = world.snapshot(original=self._shared)
         if self._shared is None:
             self._shared = start

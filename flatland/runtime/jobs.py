@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -138,6 +138,19 @@ class Jobs:
         """Makes the next step find out which updates are wanted; safe from any thread."""
         self._is_stale = True
         self._queue.interrupt()
+
+    def omit_first_calls(self, plugins: Container[FlatlandPlugin]) -> None:
+        """Treats the first updates of plugins like later ones, which are called only if wanted.
+
+        To be called before the first step.
+
+        Args:
+            plugins: Plugins whose functions do no more for an update that is not wanted than
+                `skipped` does.
+        """
+        for job in self._jobs.values():
+            if job.plugin in plugins:
+                job.was_called = True
 
     @property
     def is_pending(self) -> bool:

@@ -234,11 +234,27 @@ class Requests:
         """
         if self._role is not None:
             return action()
+        if self._acquire():
+            try:
+                if not self.actions:
+                    return self._run_now(action)
+            finally:
+                self.lock.release()
         future = self.post(action)
         while not future.done():
             if not self.process_if_idle():
                 self._waiting.wait(lambda: future.done() or self._is_idle())
         return future.result()
+
+    def _run_now(self, action: Callable[[], R]) -> R:
+        """Runs an action like one in the queue, without the cost of the queue."""
+        if self._on_post is not None:
+            self._on_post()
+        with self._as_action:
+            try:
+                return action()
+            finally:
+                self._waiting.notify()
 
     def _is_idle(self) -> bool:
         """Returns whether `process_if_idle` would run actions."""

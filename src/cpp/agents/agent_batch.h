@@ -71,6 +71,10 @@ class AgentBatch {
   // other agents may be replaced.
   void start(const AgentCommands& commands, const Run& run, const AgentObservations& rows,
              std::size_t num_threads);
+  // Whether `start` has begun anything for an agent.
+  bool is_chosen(std::size_t i) const { return commands_.steps[i] || commands_.observes[i]; }
+  // Observes another agent, between `start` and `finish`, on this thread.
+  void observe(std::size_t i);
   // Completes what `start` has begun. An agent with steps that remain is not observed, and the time
   // of its world is that before the steps.
   std::vector<UnfinishedRun> finish();
@@ -82,7 +86,6 @@ class AgentBatch {
 
   void perform(std::size_t i);
   RunResult step(const Agent& agent, const double* velocity, const Run& run);
-  void observe(std::size_t i);
 
   std::vector<Agent> agents_;
   std::vector<std::uint64_t> permitted_;  // interrupts of the world at the time of the permission

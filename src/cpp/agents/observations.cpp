@@ -11,6 +11,20 @@ float unit_limited(double number) { return std::clamp(static_cast<float>(number)
 // The lesser of two ranges, of which NaN is the greater one.
 float nearer(float a, float b) { return b < a || std::isnan(a) ? b : a; }
 
+double rewarded(const AgentPlaces& places, std::size_t i, Rewarded what) {
+  switch (what) {
+    case Rewarded::kProgress:
+      return places.previous_distance[i] - places.distance[i];
+    case Rewarded::kArrival:
+      return places.arrived[i] ? 1.0 : 0.0;
+    case Rewarded::kContact:
+      return places.collided[i] ? 1.0 : 0.0;
+    case Rewarded::kStep:
+      break;
+  }
+  return 1.0;
+}
+
 }  // namespace
 
 void locate(const AgentPlaces& places, double goal_radius) {
@@ -71,6 +85,14 @@ void write_velocities(const AgentPlaces& places, double max_speed, double max_ya
     float* to = out.row(i);
     to[0] = unit_limited(places.speed[i] / max_speed);
     to[1] = unit_limited(places.yaw_rate[i] / max_yaw_rate);
+  }
+}
+
+void write_rewards(const AgentPlaces& places, const std::vector<RewardTerm>& terms, double* out) {
+  for (std::size_t i = 0; i < places.count; ++i) {
+    double sum = 0.0;
+    for (const RewardTerm& term : terms) sum += rewarded(places, i, term.what) * term.factor;
+    out[i] = sum;
   }
 }
 

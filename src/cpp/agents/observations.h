@@ -1,7 +1,8 @@
-// The observations of agents for learning, from arrays with a row for each agent.
+// The observations and rewards of agents for learning, from arrays with a row for each agent.
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 namespace flatland {
 
@@ -17,6 +18,8 @@ struct AgentPlaces {
   double* speed;  // forward
   double* yaw_rate;
   bool* arrived;
+  const double* previous_distance;  // before the step
+  const bool* collided;             // whether the agent touched anything in the step
 };
 
 // Computes all but the poses, velocities and goals. An agent has arrived within the radius.
@@ -43,5 +46,18 @@ void write_goals(const AgentPlaces& places, double scale, const ObservationColum
 // Writes forward speed and yaw rate divided by their limits, from -1 to 1.
 void write_velocities(const AgentPlaces& places, double max_speed, double max_yaw_rate,
                       const ObservationColumns& out);
+
+// A quantity that is rewarded.
+enum class Rewarded { kProgress, kArrival, kContact, kStep };
+constexpr int kRewardedCount = 4;
+
+// A quantity multiplied by a factor.
+struct RewardTerm {
+  Rewarded what;
+  double factor;
+};
+
+// Writes the sum of terms, in their order, for each agent.
+void write_rewards(const AgentPlaces& places, const std::vector<RewardTerm>& terms, double* out);
 
 }  // namespace flatland

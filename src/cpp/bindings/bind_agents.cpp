@@ -107,6 +107,17 @@ class PyAgentBatch {
     uses_ = std::move(uses);
   }
 
+  void observe(const std::vector<std::size_t>& rows) {
+    if (!uses_) throw py::value_error("the batch has not begun");
+    for (const std::size_t row : rows) {
+      check_row(row);
+      if (batch_.is_chosen(row)) throw py::value_error("the agent steps, or is observed already");
+      // Safe with other threads at work: the world and the rows are those of this agent only.
+      World::ExclusiveUse use(*batch_.agents()[row].world, World::kStepping);
+      batch_.observe(row);
+    }
+  }
+
   void stop_threads() {
     if (uses_) throw py::value_error("`finish` was not called");
     batch_.stop_threads();
@@ -182,7 +193,8 @@ class PyAgentRows {
  public:
   PyAgentRows(Rows<double> poses, Rows<double> velocities, Rows<double> goals,
               Rows<double> goal_ahead, Rows<double> goal_left, Rows<double> distance,
-              Rows<double> speed, Rows<double> yaw_rate, Rows<bool> arrived, Rows<float> ranges)
+              Rows<double> speed, Rows<double> yaw_rate, Rows<bool> arrived,
+              Rows<double> previous_distance, Rows<bool> collided, Rows<float> ranges)
       : poses_(std::move(poses)),
         velocities_(std::move(velocities)),
         goals_(std::move(goals)),
@@ -192,6 +204,8 @@ class PyAgentRows {
         speed_(std::move(speed)),
         yaw_rate_(std::move(yaw_rate)),
         arrived_(std::move(arrived)),
+        previous_distance_(std::move(previous_distance)),
+        collided_(std::move(collided)),
         ranges_(std::move(ranges)) {
     if (poses_.ndim() != 2 || ranges_.ndim() != 2) {
       throw py::value_error("poses and ranges must have two dimensions");
@@ -205,6 +219,8 @@ class PyAgentRows {
     check_rows(speed_, count(), 1, "speed");
     check_rows(yaw_rate_, count(), 1, "yaw_rate");
     check_rows(arrived_, count(), 1, "arrived");
+    check_rows(previous_distance_, count(), 1, "previous_distance");
+    check_rows(collided_, count(), 1, "collided");
     check_rows(ranges_, count(), static_cast<std::size_t>(ranges_.shape(1)), "ranges");
   }
 
@@ -224,6 +240,18 @@ class PyAgentRows {
   void write_velocities(double max_speed, double max_yaw_rate, py::array_t<float>& out) {
     flatland::write_velocities(places(), max_speed, max_yaw_rate, columns_of(out, 2));
   }
+  py::array_t<double> rewards(const std::vector<std::pair<int, double>>& given) {
+    std::vector<RewardTerm> terms;
+    for (const auto& [what, factor] : given) {
+      if (what < 0 || what >= kRewardedCount) {
+        throw py::value_error("there is no rewarded quantity " + std::to_string(what));
+      }
+      terms.push_back({static_cast<Rewarded>(what), factor});
+    }
+    py::array_t<double> out(static_cast<py::ssize_t>(count()));
+    flatland::write_rewards(places(), terms, out.mutable_data());
+    return out;
+  }
 
  private:
   std::size_t count() const { return static_cast<std::size_t>(poses_.shape(0)); }
@@ -238,7 +266,9 @@ class PyAgentRows {
             distance_.mutable_data(),
             speed_.mutable_data(),
             yaw_rate_.mutable_data(),
-            arrived_.mutable_data()};
+            arrived_.mutable_data(),
+            previous_distance_.data(),
+            collided_.data()};
   }
 
   // A view of columns of a C-contiguous array; `expected` is 0 for any number.
@@ -255,6 +285,8 @@ class PyAgentRows {
 
   Rows<double> poses_, velocities_, goals_, goal_ahead_, goal_left_, distance_, speed_, yaw_rate_;
   Rows<bool> arrived_;
+  Rows<double> previous_distance_;
+  Rows<bool> collided_;
   Rows<float> ranges_;
 };
 
@@ -263,12 +295,14 @@ void bind_agent_rows(py::module_& module) {
 Computations on the arrays of agents for learning, with a row for each of n agents.
 )")
       .def(py::init<Rows<double>, Rows<double>, Rows<double>, Rows<double>, Rows<double>,
-                    Rows<double>, Rows<double>, Rows<double>, Rows<bool>, Rows<float>>(),
+                    Rows<double>, Rows<double>, Rows<double>, Rows<bool>, Rows<double>, Rows<bool>,
+                    Rows<float>>(),
            py::kw_only(), py::arg("poses").noconvert(), py::arg("velocities").noconvert(),
            py::arg("goals").noconvert(), py::arg("goal_ahead").noconvert(),
            py::arg("goal_left").noconvert(), py::arg("distance").noconvert(),
            py::arg("speed").noconvert(), py::arg("yaw_rate").noconvert(),
-           py::arg("arrived").noconvert(), py::arg("ranges").noconvert(), R"(
+           py::arg("arrived").noconvert(), py::arg("previous_distance").noconvert(),
+           py::arg("collided").noconvert(), py::arg("ranges").noconvert(), R"(
 Keeps the arrays, which are those of a `flatland.gym.Situation`.
 
 Raises:
@@ -314,6 +348,20 @@ Args:
 
 Raises:
     ValueError: `out` has another shape.
+)")
+      .def("rewards", &PyAgentRows::rewards, py::arg("terms"), R"(
+Returns the sums of rewarded quantities, each multiplied by a factor.
+
+Args:
+    terms: Quantities and factors, which are added up in this order. The quantities are 0: how much
+        closer to the goal the agent is than before the step [m], 1: whether it has arrived,
+        2: whether it collided, 3: the number 1.
+
+Returns:
+    The rewards, shape (n,).
+
+Raises:
+    ValueError: There is no such quantity.
 )");
 }
 
@@ -405,6 +453,19 @@ Args:
 
 Raises:
     ValueError: An array has another shape, a number is out of range, or `finish` was not called.
+    StaleHandleError: A world is closed.
+    WorldLockedError: A world is in use.
+)")
+      .def("observe", &PyAgentBatch::observe, py::arg("rows"), R"(
+Observes agents between `start` and `finish` that neither step nor are observed by these.
+
+Args:
+    rows: Indices of the agents.
+
+Raises:
+    IndexError: There is no such agent.
+    ValueError: `start` was not called, it concerns one of the agents, or the pose of an agent is
+        out of range.
     StaleHandleError: A world is closed.
     WorldLockedError: A world is in use.
 )")

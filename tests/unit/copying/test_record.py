@@ -12,7 +12,7 @@ import pytest
 
 from flatland.copying.kinds import UncopyableError
 from flatland.copying.record import SavedObjects
-from flatland.physics import changed_contents
+from flatland.physics import restore_contents
 
 
 class Derived(list[Any]):
@@ -106,24 +106,28 @@ def test_only_contents_that_are_other_objects_are_written() -> None:
     assert vars(holder) == {"parts": (), "array": None}
 
 
-def test_changed_contents_names_the_objects() -> None:
+def test_restore_contents_writes_attributes_and_names_containers() -> None:
     missing, value = object(), [1.0]
-    items, attributes = [value, value], Holder((), value)
+    items, holder = [value, value], Holder((), value)
     members = (Slotted.first, Slotted.second)  # type: ignore[attr-defined]
     slotted = Slotted()
     slotted.first = value
     entries = [
         (items, None, (), (), [], [value, value]),
-        (attributes, {"parts": (), "array": value}, (), (), [], None),
+        (holder, {"parts": (), "array": value}, ("ignored",), (), [], None),
         (slotted, None, (), members, [value, missing], None),
     ]
-    assert changed_contents(entries, missing) == []
+    assert restore_contents(entries, missing) == []
     items[1] = [1.0]
-    assert changed_contents(entries, missing) == [0]
-    attributes.extra = 1  # type: ignore[attr-defined]
-    slotted.second = 2
-    assert changed_contents(entries, missing) == [0, 1, 2]
-    entries[1] = (attributes, {"parts": (), "array": value}, ("extra",), (), [], None)
-    assert changed_contents(entries, missing) == [0, 2]
+    holder.extra = holder.ignored = 1  # type: ignore[attr-defined]
+    del holder.array
+    slotted.first, slotted.second = None, 2
+    assert restore_contents(entries, missing) == [0]
+    assert vars(holder) == {"parts": (), "array": value, "ignored": 1}
+    assert holder.array is value
+    assert slotted.first is value
+    assert not hasattr(slotted, "second")
+    items[1] = value
+    assert restore_contents(entries, missing) == []
     with pytest.raises(ValueError, match="an entry must have 6 members"):
-        changed_contents([(items, None)], missing)
+        restore_contents([(items, None)], missing)

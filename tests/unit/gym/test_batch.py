@@ -14,6 +14,8 @@ from gymnasium.vector import AutoresetMode
 from flatland.errors import StaleHandleError, WorldError, WorldLockedError
 from flatland.gym import FlatlandVectorEnv
 from flatland.gym.endings import Arrived
+from flatland.plugins.laser import Laser
+from flatland.runtime.jobs import Jobs
 from flatland.runtime.observer import WorldObserver
 from flatland.values import Twist
 
@@ -115,6 +117,34 @@ def test_an_exception_of_one_world_ends_the_steps_of_all(make: Make, room: Path)
     # No world remains locked, and the other worlds have been stepped.
     assert env._stage.worlds[0].time == env._stage.worlds[2].time == pytest.approx(0.2)
     assert not env._stage.worlds[1].requests.lock._is_owned()
+
+
+@pytest.mark.parametrize("world", ["room", "crowd"])
+def test_first_updates_without_calls_have_the_same_results(
+    make: Make, room: Path, world: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    env = create(make, room if world == "room" else world)
+    monkeypatch.setattr(Jobs, "omit_first_calls", lambda *_: None)
+    called = create(make, room if world == "room" else world)
+    assert run(env) == run(called)
+
+
+def test_a_first_update_is_called_if_it_is_wanted(make: Make, room: Path) -> None:
+    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived())
+    env.reset(seed=0)
+    first, second = (agent.laser for agent in env.episodes.agents[:2])
+    calls: list[Laser] = []
+    for laser in (first, second):
+        laser._update.function = lambda _, laser=laser: calls.append(laser)
+    (output,) = second._update.outputs
+    unsubscribe = output.subscribe(lambda _: None)
+    env.step(np.zeros((COUNT, 2)))
+    count = len(calls)
+    assert calls == [second] * count
+    assert count > 0
+    unsubscribe()
+    env.step(np.zeros((COUNT, 2)))
+    assert len(calls) == count
 
 
 def test_a_refused_call_of_the_core_advances_no_world(make: Make, room: Path) -> None:
@@ -244,3 +274,25 @@ def test_an_exception_while_worlds_step_leaves_them_complete(make: Make, room: P
     assert [world.time for world in env.worlds] == pytest.approx([0.1, 0.0, 0.1])
     env.step(actions)
     assert [world.time for world in env.worlds] == pytest.approx([0.2, 0.1, 0.2])
+
+
+def test_the_core_observes_other_agents_while_worlds_step(make: Make, room: Path) -> None:
+    env, commands, ones = begun(make, room)
+    batch, situation = env._episodes._batch, env.episodes.situation
+    acting = np.array([True, False, True])
+    core = batch._core
+    with pytest.raises(ValueError, match="has not begun"):
+        core.observe([1])
+
+    def meanwhile() -> None:
+        situation.poses[1] = situation.ranges[1] = np.nan
+        core.observe([1])
+        assert np.isfinite(situation.ranges[1]).all()
+        assert situation.poses[1].tolist() == list(env.episodes.agents[1].body.pose)
+        with pytest.raises(ValueError, match="steps, or is observed already"):
+            core.observe([0])
+        with pytest.raises(IndexError, match="no such agent"):
+            core.observe([COUNT])
+
+    assert batch.perform(commands, acting, 20, meanwhile).tolist() == []
+    assert batch.perform(commands, ones, 20, lambda: None).tolist() == []

@@ -98,6 +98,27 @@ def test_rewards_are_scaled_and_added_up(situation: Situation) -> None:
     )
 
 
+def test_the_core_adds_up_the_included_rewards_like_any_others(situation: Situation) -> None:
+    class Other(Progress):
+        """Computed in Python, since it could be something else."""
+
+    situation.previous_distance[:] = [2.7, 0.1]
+    situation.collided[:] = [True, False]
+    terms = [0.3 * Progress(), -0.7 * Contact(), 0.1 * Step(), 1.7 * Arrival()]
+    expected = np.zeros(2)
+    for term in terms:
+        expected += term.compute(situation)
+    np.testing.assert_array_equal(Sum(*terms).compute(situation), expected)
+    terms[0] = 0.3 * Other()
+    np.testing.assert_array_equal(Sum(*terms).compute(situation), expected)
+    terms[1].factor = 0.0  # type: ignore[attr-defined]
+    expected = terms[0].compute(situation) + 0.1 + terms[3].compute(situation)
+    np.testing.assert_allclose(Sum(*terms).compute(situation), expected)
+    assert Sum().compute(situation).tolist() == [0.0, 0.0]
+    with pytest.raises(ValueError, match="no rewarded quantity 4"):
+        situation.core.rewards([(4, 1.0)])
+
+
 def test_a_change_of_the_action_is_jerky(situation: Situation) -> None:
     situation.actions[:] = [(1.0, 1.0), (0.0, 0.0)]
     situation.previous_actions[:] = [(0.5, 0.0), (0.0, 0.0)]
