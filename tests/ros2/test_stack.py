@@ -211,7 +211,7 @@ def drive(folder: Path) -> Iterator[Drive]:
             runs_of(scenarios, names, seeds),
             Options(str(folder), str(folder / "out"), "none", stack),
             WorkerLimits(),
-            2,
+            4,
         )
         rows = sorted(
             (result.row for result in found), key=lambda row: names.index(row["controller"])
