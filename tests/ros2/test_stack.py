@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from room_world import MAP, WALLS
 
 from flatland.ros2.domain import MAX_DOMAIN, reserved_domain
 from flatland.scenarios.columns import Row
@@ -139,31 +138,13 @@ for each in ElementTree.parse(options.file).iter("executable"):
     programs.append(subprocess.Popen(shlex.split(command)))
 sys.exit(max(program.wait() for program in programs))
 """
-ROBOT = """
-bodies:
-  - name: base
-    footprints: [{type: circle, radius: 0.2, density: 100}]
-plugins:
-  - {type: DiffDrive, name: drive, body: base}
-  - type: Laser
-    name: laser
-    body: base
-    range: 20
-    angle: {min: -3.1, max: 3.1, increment: 0.05}
-    update_rate: 10
-    noise_std_dev: 0.01
-"""
 SCENARIO = """
 world: world.yaml
 goals: [[0, 0], [0, 2]]
 limits: {time: 30}
 require: [reached, no contact]
 """
-WORLD = """
-properties: {}
-layers: [{name: walls, map: map.yaml}]
-models: [{name: robot, model: robot.model.yaml, pose: [-2, 0, 0]}]
-"""
+ROBOT = "{name: robot, model: robot.model.yaml, pose: [-2, 0, 0]}"
 # Wall times, and what depends on them.
 TIMES = {"command_time", "max_command_time", "real_time_factor", "wall_time", "worker"}
 
@@ -177,24 +158,18 @@ def write_program(file: Path, text: str) -> None:
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(write_world: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a scenario, the node, a launch file, and `ros2` on PATH."""
-    for name, text in {
-        "map.yaml": MAP,
-        "walls.dat": WALLS,
-        "robot.model.yaml": ROBOT,
-        "world.yaml": WORLD,
-        "scenario.yaml": SCENARIO,
-        "stack.launch.xml": LAUNCH.format(program=tmp_path / "node"),
-    }.items():
-        (tmp_path / name).write_text(text)
-    write_program(tmp_path / "node", NODE)
-    programs = tmp_path / "bin"
+    folder = write_world(f"[{ROBOT}]").parent
+    (folder / "scenario.yaml").write_text(SCENARIO)
+    (folder / "stack.launch.xml").write_text(LAUNCH.format(program=folder / "node"))
+    write_program(folder / "node", NODE)
+    programs = folder / "bin"
     programs.mkdir()
     write_program(programs / "ros2", ROS2)
     monkeypatch.setenv("PATH", f"{programs}:{os.environ['PATH']}")
-    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
-    return tmp_path
+    monkeypatch.setenv("ROS_LOG_DIR", str(folder / "log"))
+    return folder
 
 
 @pytest.fixture
