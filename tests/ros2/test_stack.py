@@ -227,9 +227,12 @@ def test_a_launch_file_and_a_program_drive_to_all_goals(drive: Drive) -> None:
     assert first["late_commands"] == 0
 
 
-def test_stamped_commands(drive: Drive) -> None:
-    (row,) = drive("stamped", stamped_commands=True)
-    assert row["outcome"] == "reached", row["error"]
+def test_stamped_commands(drive: Drive, folder: Path, launcher: Any) -> None:
+    # With the command of the environment.
+    robot = f"command: {folder / 'node'} stamped"
+    command = [Path(sys.executable).with_name("flatland"), "test", folder / "scenario.yaml"]
+    options = ["--robot", robot, "--out", folder / "out", "--stamped-commands"]
+    assert launcher.program(*command, *options).wait() == 0
     (row,) = drive("stamped", start_time=4.0)
     assert "not ready after 4 s: no node publishes /cmd_vel" in row["error"]
     assert "geometry_msgs/msg/TwistStamped" in row["error"]
