@@ -43,12 +43,17 @@ fi
 # The package itself, but not the folder that contains it, where Python would find more than this package.
 site=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
 ln -sfn "$root/flatland" "$site/flatland"
-cat >"$venv/bin/flatland_ros2" <<EOF
+program() { # NAME MODULE: creates a command from the function main of a module
+  cat >"$venv/bin/$1" <<EOF
 #!$venv/bin/python
 import sys
 
-from flatland.ros2.node import main
+from $2 import main
 
-sys.exit(main())
+if __name__ == "__main__":  # Worker processes import this file.
+    sys.exit(main())
 EOF
-chmod +x "$venv/bin/flatland_ros2"
+  chmod +x "$venv/bin/$1"
+}
+program flatland flatland.cli
+program flatland_ros2 flatland.ros2.node

@@ -45,6 +45,7 @@ _EXAMPLES = (
     "flatland test my/scenarios --robot my.py:MyController --baseline old/results.json",
     "flatland test office maze --robot gap --seeds 0:20 --ray",
     "flatland test office --robot 'stack.launch planner:=dwa' --goal-action move_base",
+    "flatland test office --robot 'stack.launch.py planner:=dwa'",
 )
 _MEGABYTE = 1 << 20
 
@@ -74,8 +75,8 @@ def add(commands: Commands) -> None:
         default="gap",
         metavar="CONTROLLERS",
         help=f"names, separated by commas: {', '.join([*INCLUDED, POLICY])}, FILE.py:NAME, "
-        "MODULE:NAME, FILE.onnx, 'FILE.launch ARG:=VALUE ...' or 'command: PROGRAM ...' "
-        "(default: gap)",
+        "MODULE:NAME, FILE.onnx, 'FILE.launch ARG:=VALUE ...', 'FILE.launch.py ARG:=VALUE ...' "
+        "(also .xml, .yaml) or 'command: PROGRAM ...' (default: gap)",
     )
     parser.add_argument(
         "--seeds", type=_seeds, metavar="LIST", help="in place of those of the files: 0:20 or 1,5:9"
@@ -173,13 +174,20 @@ def _add_stack(group: argparse._ArgumentGroup) -> None:
         "--goal-topic",
         default=stack.goal_topic,
         metavar="TOPIC",
-        help=f"topic of the goals, geometry_msgs/PoseStamped (default: {stack.goal_topic})",
+        help="topic of the goals, geometry_msgs/PoseStamped (default: move_base_simple/goal, in "
+        "ROS 2 goal_pose)",
     )
     group.add_argument(
         "--goal-action",
         default="",
         metavar="NAME",
-        help="action of the goals instead, move_base_msgs/MoveBaseAction, such as move_base",
+        help="action of the goals instead: move_base_msgs/MoveBaseAction, such as move_base, or in "
+        "ROS 2 nav2_msgs/NavigateToPose, such as navigate_to_pose",
+    )
+    group.add_argument(
+        "--stamped-commands",
+        action="store_true",
+        help="the nodes send geometry_msgs/TwistStamped, as Nav2 does since Kilted (ROS 2 only)",
     )
     group.add_argument(
         "--start-limit",
@@ -257,6 +265,7 @@ def _run(options: argparse.Namespace, runs: Sequence[Run], stop: StopSignals) ->
                 options.goal_topic,
                 options.goal_action,
                 options.start_limit,
+                options.stamped_commands,
             ),
         ),
         WorkerLimits(

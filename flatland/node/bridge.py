@@ -155,12 +155,15 @@ class Bridge(WorldObserver):
         from_message = adapter.from_message
 
         def receive(message: Any) -> None:
-            value = from_message(message)
-            self._post(lambda: _set_command(command, value))
+            self.command_received(command, from_message(message))
 
         self._commands[command] = self._transport.subscribe(
             command.name, adapter.message_type, receive, owner=command.owner
         )
+
+    def command_received(self, command: Command[Any], value: Any) -> None:
+        """Sets a command between two steps; called in any thread."""
+        self._post(lambda: _set_command(command, value))
 
     def command_closed(self, command: Command[Any]) -> None:
         """Closes the subscription of a command."""

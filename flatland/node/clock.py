@@ -73,8 +73,17 @@ class SimulatedClock(NodeClock):
         )
         transport.set_time(0)
 
+    def keep_time(self) -> None:
+        """Makes the ROS time continue when the world is reset next.
+
+        From the reset on, all stamps are the simulated time plus the current ROS time.
+        """
+        offset = self._now_ns
+        set_stamps(lambda time_ns: time_ns + offset)
+
     def close(self) -> None:
-        """Ends the topic, and the thread of a limited clock."""
+        """Ends the topic, and the thread of a limited clock; stamps are simulated times again."""
+        set_stamps(None)
         if self._ticker is not None:
             self._ticker.close()
         self._topic.close()
@@ -91,8 +100,8 @@ class SimulatedClock(NodeClock):
 
     def time_advanced(self, time_ns: int) -> None:
         """Sets the ROS time, and publishes it unless the rate is limited."""
-        self._now_ns = time_ns
-        self._transport.set_time(time_ns)
+        self._now_ns = stamp(time_ns)
+        self._transport.set_time(self._now_ns)
         if self._ticker is None and self._topic.connected:
             self._topic.send()
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import argparse
 import gc
-import logging
 import sys
-import threading
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from flatland.node.parameters import Ros2Parameters, read_parameters, read_table
 from flatland.node.run import NodeRun
@@ -17,11 +15,7 @@ from flatland.node.run import NodeRun
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-_LOG = logging.getLogger("flatland")
-
 NODE_NAME: Final = "flatland_server"
-_SPIN_PERIOD: Final = 3600.0  # s
-_EXECUTOR_TIMEOUT: Final = 0.5  # s, for the callback in progress when the node ends
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -91,6 +85,7 @@ class ServerNode:
             FlatlandError: The world cannot be loaded.
         """
         from flatland.node.clock import NodeClock, SimulatedClock, WallClock
+        from flatland.ros2.executor import ExecutorThread
         from flatland.ros2.parameters import DeclaredParameters
         from flatland.ros2.transport import Ros2Transport
 
@@ -118,7 +113,7 @@ class ServerNode:
             use_stamped_twists()
         from flatland.ros2.simulation_services import simulation_services
 
-        with closing(_ExecutorThread(node)):
+        with closing(ExecutorThread(node)):
             self._run.serve(
                 parameters,
                 transport,
@@ -126,40 +121,6 @@ class ServerNode:
                 lambda served: simulation_services(transport, served, node),
                 ended=transport.shut_down,
             )
-
-
-class _ExecutorThread:
-    """Runs the callbacks of the node in a thread, until `close`."""
-
-    def __init__(self, node: Node) -> None:
-        """Starts the thread."""
-        from rclpy.executors import SingleThreadedExecutor
-        from rclpy.task import Future
-
-        # Not the experimental EventsExecutor: the process crashes when connections are closed while
-        # others are opened.
-        self._executor: Any = SingleThreadedExecutor()
-        self._executor.add_node(node)
-        self._end = Future(executor=self._executor)
-        self._thread = threading.Thread(target=self._run, name="flatland-executor", daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        """Ends the thread."""
-        self._end.set_result(None)
-        self._executor.wake()
-        self._thread.join(_EXECUTOR_TIMEOUT)
-
-    def _run(self) -> None:
-        from rclpy.exceptions import InvalidHandle
-
-        while not self._end.done():
-            try:
-                self._executor.spin_until_future_complete(self._end, _SPIN_PERIOD)
-            except InvalidHandle:
-                pass  # An event of a connection that has just been closed.
-            except Exception:
-                _LOG.exception("unexpected internal error in a callback")
 
 
 def _first_line(error: Exception) -> str:

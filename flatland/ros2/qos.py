@@ -34,6 +34,8 @@ _SENSORS: Final = frozenset(
     )
 )
 STATIC_TRANSFORMS: Final = "/tf_static"
+_TRANSFORMS: Final = "/tf"
+_TRANSFORM_DEPTH: Final = 100  # messages; several nodes send some in each step
 _MAP: Final = "nav_msgs/msg/OccupancyGrid"
 
 
@@ -79,7 +81,9 @@ def of_subscription(topic: str, message_type: type[Any]) -> QoSProfile:
         message_type: The message class.
     """
     if topic == STATIC_TRANSFORMS:
-        return QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        return QoSProfile(depth=_TRANSFORM_DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    if topic == _TRANSFORMS:
+        return QoSProfile(depth=_TRANSFORM_DEPTH)
     if type_name(message_type) == _MAP:
         return STATE
     return QoSProfile(depth=_MIN_DEPTH)

@@ -17,14 +17,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import FlatlandError
 from flatland.scenarios.columns import Row, empty_row
+from flatland.scenarios.connection import StackError
 from flatland.scenarios.controllers import find_controller
 from flatland.scenarios.events import Events
 from flatland.scenarios.measures import Measures, distance_left, success_weighted_length
 from flatland.scenarios.outline import outline_of
 from flatland.scenarios.planner import PlanningError, shortest_length
-from flatland.scenarios.stack import GaveUpError, Stack, StackError, opened
+from flatland.scenarios.stack import GaveUpError, Stack, opened
 from flatland.scenarios.stack_options import StackCommand, StackOptions
-from flatland.scenarios.stage import Stage, drive_topic, prepare
+from flatland.scenarios.stage import Stage, prepare
 from flatland.scenarios.worlds import world_file
 from flatland.values import Twist
 from flatland.world import World
@@ -160,8 +161,7 @@ def _run(
         try:
             stage = prepare(world, run)
             if stack is not None:
-                topic = drive_topic(stage.robot, scenario.robot)
-                stage = stack.start(run, stage, topic, lambda: prepare(world, run))
+                stage = stack.start(run, stage, lambda: prepare(world, run))
             result.outline = outline_of(world)
             result.goals = list(stage.task.goals)
             driver = _Driver(stage, create, begin_command)

@@ -6,31 +6,38 @@ import os
 import threading
 from typing import TYPE_CHECKING, Any, Final
 
-from flatland.node.values import WORLD_FRAME
 from flatland.ros.transport import inbound
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.ros_transport import RosTransport
-from flatland.timekeeper import NANOSECONDS
+from flatland.scenarios.connection import StackError, set_goal
 
 if TYPE_CHECKING:
+    from flatland.geometry import Pose
     from flatland.node.transport import Transport
-    from flatland.ros.transport.subscriber import Subscriber
-    from flatland.scenarios.stack_link import Route
+    from flatland.scenarios.stack_options import StackOptions
 
 _NODE: Final = "flatland_server"
 _CLOSE_TIMEOUT: Final = 2.0  # s
-_TF_TIME: Final = 10.0  # s of transforms that are kept
+_UNSUCCESSFUL: Final = {2: "preempted", 4: "aborted", 5: "rejected", 8: "recalled"}
+"""Final states of actionlib_msgs/GoalStatus without success."""
 
 
 class Ros1:
-    """A ROS master in a thread, and the node of this process.
+    """A ROS master in a thread, and the node of this process."""
 
-    Attributes:
-        environment: Variables of the environment of nodes.
-    """
+    goal_topic = "move_base_simple/goal"
 
-    def __init__(self) -> None:
-        """Starts the master on a free port; rospy can be initialized once per process."""
+    def __init__(self, options: StackOptions) -> None:
+        """Starts the master on a free port; rospy can be initialized once per process.
+
+        Args:
+            options: Types of messages.
+
+        Raises:
+            StackError: The options require ROS 2.
+        """
+        if options.stamped_commands:
+            raise StackError("--stamped-commands requires nodes of ROS 2")
         self.environment = {"ROS_HOSTNAME": "localhost"}
         os.environ.update(self.environment)
         os.environ.pop("ROS_IP", None)
@@ -45,36 +52,15 @@ class Ros1:
         rospy.init_node(_NODE, argv=[], disable_signals=True, disable_rostime=True)
         rospy.set_param("/use_sim_time", True)
         self._registrar = Registrar()
+        self.transport: Transport = RosTransport(self._registrar)
 
-    def listen(self) -> None:
-        """Receives transforms from now on; the clock must have been set."""
-        import rospy
-        import tf2_ros
+    def action(self, name: str) -> _ActionGoals:
+        """Returns what sends goals to an action of the type `move_base_msgs/MoveBaseAction`."""
+        return _ActionGoals(self.transport, name)
 
-        self._transforms = tf2_ros.Buffer(rospy.Duration(_TF_TIME), debug=False)
-        self._listener = tf2_ros.TransformListener(self._transforms)
-
-    def transport(self, route: Route) -> Transport:
-        """Returns the transport of the node."""
-        return _RoutedTransport(self._registrar, route)
-
-    def position(self, frame: str, stamp_ns: int) -> tuple[float, float] | None:
-        """Returns the position of a frame in the map by `/tf` [m]; None if it is not known.
-
-        Args:
-            frame: The frame.
-            stamp_ns: Simulated time [ns].
-        """
-        import rospy
-        import tf2_ros
-
-        stamp = rospy.Time(*divmod(stamp_ns, NANOSECONDS))
-        try:
-            found = self._transforms.lookup_transform(WORLD_FRAME, frame, stamp)
-        except tf2_ros.TransformException:
-            return None
-        translation = found.transform.translation
-        return (translation.x, translation.y)
+    def publishers(self, topic: str) -> str:  # noqa: ARG002
+        """Returns an empty text: publishers of another type are errors of ROS."""
+        return ""
 
     def close(self) -> None:
         """Ends the node and the master."""
@@ -87,17 +73,48 @@ class Ros1:
         self._master.stop()
 
 
-class _RoutedTransport(RosTransport):
-    """A transport in which another function may receive the messages of a topic."""
+class _ActionGoals:
+    """Sends goals to an action, which consists of topics."""
 
-    def __init__(self, registrar: Registrar, route: Route) -> None:
-        super().__init__(registrar)
-        self._route = route
+    def __init__(self, transport: Transport, name: str) -> None:
+        self._name = name
+        self._message_class = transport.message_class("move_base_msgs/MoveBaseActionGoal")
+        self._goals = transport.advertise(f"{name}/goal", self._message_class, queue_size=10)
+        self._has_status = threading.Event()
+        self._number = self.recoveries = 0
+        self.given_up = ""
+        for topic, kind, receive in (
+            ("status", "actionlib_msgs/GoalStatusArray", self._receive_status),
+            ("recovery_status", "move_base_msgs/RecoveryStatus", self._receive_recovery),
+        ):
+            transport.subscribe(f"{name}/{topic}", transport.message_class(kind), receive)
 
-    def subscribe(
-        self, topic: str, message_type: type[Any], *rest: Any, **options: Any
-    ) -> Subscriber:
-        """Calls a function with each message of a topic, in a rospy thread."""
-        receive, *others = rest
-        routed = self._route(self.resolve(topic), receive)
-        return super().subscribe(topic, message_type, routed, *others, **options)
+    @property
+    def missing(self) -> str:
+        if not self._goals.connected:
+            return f"no node subscribes to {self._goals.topic}"
+        return "" if self._has_status.is_set() else f"the action {self._name} is not available"
+
+    @property
+    def _goal_id(self) -> str:
+        return f"flatland-{self._number}"
+
+    def send(self, goal: Pose) -> None:
+        self._number += 1
+        self.given_up = ""
+        message: Any = self._message_class()
+        message.goal_id.id = self._goal_id
+        set_goal(message.goal.target_pose, goal)
+        self._goals.publish(message)
+
+    def _receive_status(self, message: Any) -> None:
+        """Receives the states of all goals of the action; called in any thread."""
+        self._has_status.set()
+        for one in message.status_list:
+            if one.goal_id.id == self._goal_id and one.status in _UNSUCCESSFUL:
+                reason = f"{self._name} {_UNSUCCESSFUL[one.status]} the goal"
+                self.given_up = f"{reason}: {one.text}" if one.text else reason
+
+    def _receive_recovery(self, _message: Any) -> None:
+        """Counts a recovery behaviour; called in the thread of the connection."""
+        self.recoveries += 1

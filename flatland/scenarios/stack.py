@@ -1,7 +1,8 @@
 """ROS nodes as the controller of a run.
 
 The world is stepped in the process of the run, which is a ROS node with the same topics as the
-simulator node. A master of its own, the nodes of the stack and all their processes end with it.
+simulator node. Its master or domain is its own; the nodes of the stack and all their processes end
+with it.
 """
 
 from __future__ import annotations
@@ -13,33 +14,31 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
+from flatland.scenarios.connection import StackError
 from flatland.scenarios.programs import Program
 from flatland.scenarios.stack_link import StackLink
+from flatland.scenarios.transforms import KEPT
 from flatland.timekeeper import NANOSECONDS
 from flatland.values import Twist
 
 if TYPE_CHECKING:
     from flatland.geometry import Pose, Vector2
     from flatland.runtime.observer import WorldObserver
-    from flatland.scenarios.ros1 import Ros1
+    from flatland.scenarios.connection import Ros
     from flatland.scenarios.scenario import Run
     from flatland.scenarios.stack_options import StackCommand, StackOptions
     from flatland.scenarios.stage import Stage
     from flatland.scenarios.task import Scan, Task
 
-_WARM_UP: Final = (
-    1.0  # s; the time of the start is a multiple of it, so that rates keep their phase
-)
+_WARM_UP: Final = 1.0  # s; the ROS time of the start is a multiple of it
 _PATIENCE: Final = 1.0  # wall time that a stack which has sent its last command may need [s]
 _WATCHDOG: Final = 1.0  # simulated time without commands after which the robot stops [s]
 _SILENCE: Final = 10.0  # simulated time without commands after which the stack has failed [s]
 _MAX_COMMANDS: Final = 200  # per second of simulated time
+_MANY_COMMANDS: Final = 100  # per second of simulated time; more may be many more
 _LEAST_RATE: Final = 0.95  # simulated time per wall time that counts as real time
-_TF_DELAY: Final = 0.5  # simulated time until the transforms of a time have arrived [s]
-
-
-class StackError(Exception):
-    """The nodes do not drive the robot; the text is the reason."""
+_TF_DELAY: Final = 0.5  # simulated time until the transforms of a time have usually arrived [s]
+_TF_LIMIT: Final = KEPT - 1.0  # simulated time after which they are not awaited any longer [s]
 
 
 class GaveUpError(Exception):
@@ -53,7 +52,7 @@ class Stack:
         observers: Observers that the world must be loaded with.
     """
 
-    def __init__(self, ros: Ros1, command: StackCommand, options: StackOptions) -> None:
+    def __init__(self, ros: Ros, command: StackCommand, options: StackOptions) -> None:
         """Starts no program yet.
 
         Args:
@@ -64,8 +63,7 @@ class Stack:
         self._ros = ros
         self._command = command
         self._options = options
-        self._link = StackLink(ros.transport, options)
-        ros.listen()
+        self._link = StackLink(ros, options)
         self.observers: list[WorldObserver] = [self._link.bridge, self._link]
         self._program: Program | None = None
         self._stage: Stage | None = None
@@ -91,18 +89,15 @@ class Stack:
         self._link.close()
         self._ros.close()
 
-    def start(
-        self, run: Run, stage: Stage, drive_topic: str, prepare: Callable[[], Stage]
-    ) -> Stage:
+    def start(self, run: Run, stage: Stage, prepare: Callable[[], Stage]) -> Stage:
         """Starts the nodes, and steps the world in real time until they are ready.
 
-        The world is then reset and prepared again, while the time continues: each run begins in
+        The world is then reset and prepared again, while the ROS time continues: each run begins in
         the same state.
 
         Args:
             run: The run.
             stage: The prepared run.
-            drive_topic: Topic of the command of the robot.
             prepare: Prepares the world again.
 
         Returns:
@@ -112,7 +107,7 @@ class Stack:
             StackError: The program cannot be started or ends, or the nodes are not ready in time.
         """
         link, world = self._link, stage.world
-        link.attach(stage, drive_topic)
+        link.attach(stage)
         link.send_initial_pose(stage.start)
         command = self._command
         try:
@@ -121,17 +116,23 @@ class Stack:
             raise StackError(f"{command.program[0]}: {error.strerror}") from error
         self._warm_up(stage)
         link.use(None)  # Its robot is about to be deleted.
+        link.keep_time()
         with link.transport.closing_last():
-            world.reset(seed=run.seed, keep_time=True)
+            world.reset(seed=run.seed)
             stage = prepare()
         link.use(stage)
         link.take()
         self._stage = stage
         self._last_command = stage.time
+        link.send_initial_pose(stage.start)
+        # Before the first scan, whose command is awaited at the end of the first period.
+        self._send_goal(stage.start, stage.task.goals[0])
         return stage
 
     def command(self, scan: Scan, pose: Pose, goal: Vector2) -> Twist:  # noqa: ARG002 - by topics
         """Returns the last command of the nodes, and sends them a new goal.
+
+        The first call is after the first step, in which the sensors sent their first messages.
 
         Raises:
             StackError: The program has ended, or the nodes send too many or no commands.
@@ -140,16 +141,14 @@ class Stack:
         stage = self._require_stage()
         if math.isnan(self._began):
             self._began, self._began_at = time.monotonic(), stage.time
-            self._link.send_initial_pose(pose)
-            # The sensors have sent nothing yet.
-            self._send_goal(pose, goal)
             return self._twist
-        if goal != self._goal:
-            self._send_goal(pose, goal)
         self._sample(pose)
         self._keep_pace(stage)
         self._check_program()
         count, twist = self._link.take()
+        # Not before: the awaited command would be that to the old or to the new goal by chance.
+        if goal != self._goal:
+            self._send_goal(pose, goal)
         self._check_count(count, stage.task.period)
         now = stage.time
         if count:
@@ -158,6 +157,9 @@ class Stack:
             self._late += 1
         if self._link.given_up:
             raise GaveUpError(self._link.given_up)
+        if count > _MANY_COMMANDS * stage.task.period and self._options.pace == "lockstep":
+            # In real time, so that those which wait to be received are counted as well.
+            time.sleep(stage.task.period)
         silent_for = now - self._last_command
         if silent_for > _SILENCE:
             kind = GaveUpError if self._has_driven else StackError
@@ -202,7 +204,7 @@ class Stack:
     def _send_goal(self, pose: Pose, goal: Vector2) -> None:
         """Sends a goal, with the heading from the robot to it."""
         self._goal = goal
-        self._link.send_goal(goal, math.atan2(goal[1] - pose[1], goal[0] - pose[0]))
+        self._link.send_goal((*goal, math.atan2(goal[1] - pose[1], goal[0] - pose[0])))
 
     def _warm_up(self, stage: Stage) -> None:
         """Steps in real time until the nodes are ready."""
@@ -210,6 +212,7 @@ class Stack:
         step_size = world.timekeeper.step_size
         steps = max(1, round(_WARM_UP / step_size))
         end = time.monotonic() + self._options.start_time
+        was_ready = False
         while True:
             start = time.monotonic()
             for number in range(1, steps + 1):
@@ -217,9 +220,11 @@ class Stack:
                 time.sleep(max(0.0, start + number * step_size - time.monotonic()))
             self._check_program()
             missing = self._link.missing
-            if not missing:
+            # Nodes that have just started may not have discovered all topics of this one yet.
+            if was_ready and not missing:
                 return
-            if time.monotonic() > end:
+            was_ready = not missing
+            if missing and time.monotonic() > end:
                 limit = self._options.start_time
                 raise StackError(f"not ready after {limit:g} s: {missing}{self._log()}")
 
@@ -252,9 +257,12 @@ class Stack:
         """Compares the true pose with the localisation, as soon as its transforms have arrived."""
         now = self._require_stage().world.timekeeper.sim_time_ns
         self._waiting.append((now, pose))
-        while now - self._waiting[0][0] > _TF_DELAY * NANOSECONDS:
-            stamp, (x, y, _theta) = self._waiting.popleft()
-            found = self._ros.position(self._link.base_frame, stamp)
+        while (age := now - self._waiting[0][0]) > _TF_DELAY * NANOSECONDS:
+            stamp, (x, y, _theta) = self._waiting[0]
+            found = self._link.position(stamp)
+            if found is None and age < _TF_LIMIT * NANOSECONDS:
+                return
+            self._waiting.popleft()
             if found is not None:
                 self._errors.append(math.dist(found, (x, y)))
 
@@ -262,9 +270,16 @@ class Stack:
 @contextmanager
 def opened(command: StackCommand, options: StackOptions) -> Iterator[Stack]:
     """Connects this process to ROS for one run; a process can be connected only once."""
-    from flatland.scenarios.ros1 import Ros1
+    ros: Ros
+    if command.ros == 1:
+        from flatland.scenarios.ros1 import Ros1
 
-    stack = Stack(Ros1(), command, options)
+        ros = Ros1(options)
+    else:
+        from flatland.scenarios.ros2 import Ros2
+
+        ros = Ros2(options)
+    stack = Stack(ros, command, options)
     try:
         yield stack
     finally:

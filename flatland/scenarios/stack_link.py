@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.geometry import compose, invert
 from flatland.node.bridge import TF_QUEUE_SIZE, Bridge
 from flatland.node.clock import SimulatedClock
 from flatland.node.maps import PublishedLayer
-from flatland.node.values import WORLD_FRAME, Transforms
+from flatland.node.stamps import stamp as message_stamp
+from flatland.node.values import WORLD_FRAME, FrameParents, Transforms
 from flatland.runtime.observer import WorldObserver
-from flatland.values import Transform, Twist
+from flatland.scenarios.connection import Goals, Ros, TopicGoals, set_pose
+from flatland.scenarios.transforms import TransformHistory
+from flatland.values import Transform
 
 if TYPE_CHECKING:
-    from flatland.geometry import Pose, Vector2
+    from flatland.geometry import Pose
+    from flatland.node.clock import NodeClock
     from flatland.node.transport import Publisher, Transport
+    from flatland.plugin_api.ports import Command
     from flatland.scenarios.stack_options import StackOptions
     from flatland.scenarios.stage import Stage
 
@@ -25,11 +30,6 @@ _MAP_RESOLUTION: Final = 0.05  # of a layer without an image [m]
 _POSITION_VARIANCE: Final = 0.01  # of the initial pose [m^2]
 _ANGLE_VARIANCE: Final = 0.01  # [rad^2]
 _REGISTRATION_TIMEOUT: Final = 5.0  # s
-_UNSUCCESSFUL: Final = {2: "preempted", 4: "aborted", 5: "rejected", 8: "recalled"}
-"""Final states of actionlib_msgs/GoalStatus without success."""
-
-Route = Callable[[str, Callable[[Any], object]], Callable[[Any], object]]
-"""Returns what receives the messages of a topic, from its name and what would receive them."""
 
 
 class StackLink(WorldObserver):
@@ -40,29 +40,33 @@ class StackLink(WorldObserver):
         transport: Publishes and subscribes.
     """
 
-    def __init__(self, open_transport: Callable[[Route], Transport], options: StackOptions) -> None:
+    def __init__(self, ros: Ros, options: StackOptions) -> None:
         """Publishes the clock; the world is loaded with this object and `bridge` as observers.
 
         Args:
-            open_transport: Returns the transport, which asks for the receiver of each topic.
+            ros: The connection to ROS.
             options: Topics and frames.
         """
+        self._ros = ros
         self._options = options
         self._commands = threading.Condition()  # guards the members below
         self._drive_topic = ""
         self._latest: Any = None
         self._count = 0
-        self.transport = open_transport(self._route)
+        self.transport = ros.transport
         self._clock = SimulatedClock(self.transport)
-        self.bridge = Bridge(self.transport, self._clock)
+        self.bridge: Bridge = _CollectingBridge(self.transport, self._clock, self._collect)
         self._tf, self._convert = self.transport.values("/tf", Transforms, queue_size=TF_QUEUE_SIZE)
+        self._transforms = TransformHistory()
+        if options.localization == "stack":
+            message_class, _ = self.transport.receivable(FrameParents)
+            for topic, is_static in (("/tf", False), ("/tf_static", True)):
+                receive = partial(self._transforms.add_message, is_static=is_static)
+                self.transport.subscribe(topic, message_class, receive)
         self._stage: Stage | None = None
         self._base_frame = ""
-        self._goals: Publisher | None = None
+        self._goals: Goals | None = None
         self._initial_pose: Publisher | None = None
-        self._has_action = threading.Event()
-        self._goal_number = self._recoveries = 0
-        self._given_up = ""
 
     def close(self) -> None:
         """Ends the clock."""
@@ -71,40 +75,30 @@ class StackLink(WorldObserver):
 
     # -- a run -----------------------------------------------------------------------------
 
-    def attach(self, stage: Stage, drive_topic: str) -> None:
-        """Collects the commands of a robot, and publishes the map and the topics of its goals.
+    def attach(self, stage: Stage) -> None:
+        """Collects the commands of the robot, and publishes the map and the topics of its goals.
 
         Args:
             stage: The prepared run.
-            drive_topic: Topic of its command.
         """
         with self._commands:
-            self._drive_topic = self.transport.resolve(drive_topic)
+            self._drive_topic = stage.drive.topic
         self.use(stage)
         layer = stage.world.map_layer or next(
             (name for each in stage.world.layers for name in each.names), ""
         )
         if layer:
             PublishedLayer(self.transport, stage.world, layer, WORLD_FRAME, _MAP_RESOLUTION)
-        action = self._options.goal_action
-        topic = f"{action}/goal" if action else self._options.goal_topic
-        goal_type = "move_base_msgs/MoveBaseActionGoal" if action else "geometry_msgs/PoseStamped"
-        message_class = self.transport.message_class
-        self._goals = self.transport.advertise(topic, message_class(goal_type), queue_size=10)
+        options = self._options
+        if options.goal_action:
+            self._goals = self._ros.action(options.goal_action)
+        else:
+            self._goals = TopicGoals(self.transport, options.goal_topic or self._ros.goal_topic)
         self._initial_pose = self.transport.advertise(
-            "initialpose", message_class("geometry_msgs/PoseWithCovarianceStamped"), latch=True
+            "initialpose",
+            self.transport.message_class("geometry_msgs/PoseWithCovarianceStamped"),
+            latch=True,
         )
-        if action:
-            self.transport.subscribe(
-                f"{action}/status",
-                message_class("actionlib_msgs/GoalStatusArray"),
-                self._receive_status,
-            )
-            self.transport.subscribe(
-                f"{action}/recovery_status",
-                message_class("move_base_msgs/RecoveryStatus"),
-                self._receive_recovery,
-            )
         self.transport.flush(_REGISTRATION_TIMEOUT)
 
     def use(self, stage: Stage | None) -> None:
@@ -113,21 +107,16 @@ class StackLink(WorldObserver):
         if stage is not None:
             self._base_frame = stage.robot.frame(stage.robot.bodies[0].name)
 
-    @property
-    def base_frame(self) -> str:
-        """Frame of the robot."""
-        return self._base_frame
+    def keep_time(self) -> None:
+        """Makes the ROS time continue when the world is reset next."""
+        self._clock.keep_time()
 
     @property
     def missing(self) -> str:
         """What the stack lacks to be driven, as a text; empty if it is ready."""
         if not self.transport.is_connected(self._drive_topic):
-            return f"no node publishes {self._drive_topic}"
-        if self._goals is None or not self._goals.connected:
-            return f"no node subscribes to {self._goals.topic if self._goals else 'goals'}"
-        if self._options.goal_action and not self._has_action.is_set():
-            return f"the action {self._options.goal_action} is not available"
-        return ""
+            return f"no node publishes {self._drive_topic}{self._ros.publishers(self._drive_topic)}"
+        return "" if self._goals is None else self._goals.missing
 
     def send_initial_pose(self, pose: Pose) -> None:
         """Sends a pose to the localisation, also to one that subscribes later."""
@@ -135,56 +124,27 @@ class StackLink(WorldObserver):
             return
         message = self.transport.message_class("geometry_msgs/PoseWithCovarianceStamped")()
         message.header.frame_id = WORLD_FRAME
-        _set_pose(message.pose.pose, pose)
+        set_pose(message.pose.pose, pose)
         covariance = [0.0] * 36
         covariance[0] = covariance[7] = _POSITION_VARIANCE
         covariance[35] = _ANGLE_VARIANCE
         message.pose.covariance = covariance
         self._initial_pose.publish(message)
 
-    def send_goal(self, goal: Vector2, yaw: float) -> None:
+    def send_goal(self, goal: Pose) -> None:
         """Sends a goal in the frame `map`."""
-        if self._goals is None:
-            return
-        action = self._options.goal_action
-        kind = "move_base_msgs/MoveBaseActionGoal" if action else "geometry_msgs/PoseStamped"
-        message = self.transport.message_class(kind)()
-        target = message
-        if action:
-            self._goal_number += 1
-            self._given_up = ""
-            message.goal_id.id = self._goal_id
-            target = message.goal.target_pose
-        target.header.frame_id = WORLD_FRAME
-        _set_pose(target.pose, (*goal, yaw))
-        self._goals.publish(message)
+        if self._goals is not None:
+            self._goals.send(goal)
 
     @property
     def given_up(self) -> str:
         """Why the action ended the current goal without success; empty if it has not."""
-        return self._given_up
+        return "" if self._goals is None else self._goals.given_up
 
     @property
     def recoveries(self) -> int:
         """Number of recovery behaviours that the action has begun."""
-        return self._recoveries
-
-    @property
-    def _goal_id(self) -> str:
-        return f"flatland-{self._goal_number}"
-
-    def _receive_status(self, message: Any) -> None:
-        """Receives the states of all goals of the action; called in any thread."""
-        self._has_action.set()
-        for one in message.status_list:
-            if one.goal_id.id == self._goal_id and one.status in _UNSUCCESSFUL:
-                verb, text = _UNSUCCESSFUL[one.status], one.text
-                reason = f"{self._options.goal_action} {verb} the goal"
-                self._given_up = f"{reason}: {text}" if text else reason
-
-    def _receive_recovery(self, _message: Any) -> None:
-        """Counts a recovery behaviour; called in the thread of the connection."""
-        self._recoveries += 1
+        return 0 if self._goals is None else self._goals.recoveries
 
     # -- commands --------------------------------------------------------------------------
 
@@ -204,40 +164,58 @@ class StackLink(WorldObserver):
             self._count, self._latest = 0, None
         return count, latest
 
-    def _route(self, topic: str, receive: Callable[[Any], object]) -> Callable[[Any], object]:
-        """Returns what receives the messages of a topic; called in any thread."""
-
-        def collect(message: Any) -> None:
-            if topic != self._drive_topic:
-                receive(message)
-                return
-            command = message
-            with self._commands:
-                self._count += 1
-                self._latest = Twist(command.linear.x, command.linear.y, command.angular.z)
-                self._commands.notify()
-
-        return collect
+    def _collect(self, command: Command[Any], value: Any) -> bool:
+        """Takes a command of the robot; returns False for others. Called in any thread."""
+        if command.topic != self._drive_topic:
+            return False
+        with self._commands:
+            self._count += 1
+            self._latest = value
+            self._commands.notify()
+        return True
 
     # -- transforms ------------------------------------------------------------------------
 
     @property
     def wants_transforms(self) -> bool:
-        """Whether the link sends a localisation."""
-        return self._options.localization == "true" and self._tf.connected
+        """Returns True: the localisation is measured by them."""
+        return True
 
     def transforms_sent(self, transforms: Sequence[Transform]) -> None:
         """Sends the true transform from the map to the frame of the odometry."""
-        if self._stage is None:
+        self._transforms.add(transforms)
+        if self._stage is None or self._options.localization != "true":
             return
         pose = self._stage.robot.pose
         for sent in transforms:
             if sent.child == self._base_frame and sent.parent != WORLD_FRAME:
                 origin = compose(pose, invert((sent.x, sent.y, sent.yaw)))
-                localized = Transform(sent.stamp, WORLD_FRAME, sent.parent, *origin)
-                self._tf.publish(self._convert(Transforms((localized,))))
+                localized = Transforms((Transform(sent.stamp, WORLD_FRAME, sent.parent, *origin),))
+                self._transforms.add(localized)
+                self._tf.publish(self._convert(localized))
+
+    def position(self, stamp: int) -> tuple[float, float] | None:
+        """Returns the position of the robot in the map by transforms [m]; None if it is not known.
+
+        Args:
+            stamp: Simulated time of the run [ns].
+        """
+        return self._transforms.position(self._base_frame, message_stamp(stamp))
 
 
-def _set_pose(target: Any, pose: Pose) -> None:
-    target.position.x, target.position.y = pose[:2]
-    target.orientation.z, target.orientation.w = math.sin(pose[2] / 2), math.cos(pose[2] / 2)
+class _CollectingBridge(Bridge):
+    """A bridge whose commands may be taken by a function."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        clock: NodeClock,
+        collect: Callable[[Command[Any], Any], bool],
+    ) -> None:
+        super().__init__(transport, clock)
+        self._collect = collect
+
+    def command_received(self, command: Command[Any], value: Any) -> None:
+        """Passes a command to the function, or else to the world."""
+        if not self._collect(command, value):
+            super().command_received(command, value)

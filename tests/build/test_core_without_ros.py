@@ -12,7 +12,7 @@ import importlib, pkgutil, sys
 
 WITH_ROS = {
     "flatland.ros", "flatland.ros2", "flatland.viewer", "flatland.msg", "flatland.srv",
-    "flatland.scenarios.ros1",
+    "flatland.scenarios.ros1", "flatland.scenarios.ros2",
 }
 # Raises an error that names the extra.
 WITH_EXTRA = {"flatland.gym.stable_baselines"}

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
-import random
 import signal
 import sys
-import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,7 +17,8 @@ from programs import Program
 from room_world import write_room_world
 from waiting import TIMEOUT, wait_until
 
-_MAX_DOMAIN = 101  # of those whose ports are free on every system
+from flatland.ros2.domain import reserved_domain
+
 _BOOTSTRAP = ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
 
 
@@ -34,19 +32,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session", autouse=True)
 def domain() -> Iterator[int]:
     """A domain that no other test process of this machine uses."""
-    numbers = random.sample(range(1, _MAX_DOMAIN + 1), _MAX_DOMAIN)
-    for number in numbers:
-        lock = Path(tempfile.gettempdir()) / f"flatland_ros2_domain_{number}"
-        with lock.open("w") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                continue
-            os.environ["ROS_DOMAIN_ID"] = str(number)
-            os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-            yield number
-            return
-    pytest.fail("all domains are in use")
+    with reserved_domain() as number:
+        os.environ["ROS_DOMAIN_ID"] = str(number)
+        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        yield number
 
 
 class Topic(MessageQueue):

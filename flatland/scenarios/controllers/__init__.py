@@ -6,7 +6,10 @@ import functools
 import hashlib
 import importlib
 import importlib.util
+import os
+import re
 import shlex
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +20,7 @@ from flatland.scenarios.controllers.dynamic_window import DynamicWindow
 from flatland.scenarios.controllers.pursuit import PurePursuit
 from flatland.scenarios.controllers.random_walk import RandomWalk
 from flatland.scenarios.controllers.reactive import Gap, Straight
-from flatland.scenarios.stack_options import StackCommand
+from flatland.scenarios.stack_options import RosVersion, StackCommand
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -36,14 +39,18 @@ INCLUDED: Final[dict[str, type[Controller]]] = {
 POLICY: Final = "policy"
 """Name of the included policy, which requires the extra `onnx`."""
 _POLICY_FILE: Final = ".onnx"
-
-
 _COMMAND: Final = "command:"
+_ROS1_FILE: Final = ".launch"
+_ROS2_FILE: Final = re.compile(r"[._]launch\.(py|xml|yaml)$")
+_CLIENTS: Final[dict[RosVersion, str]] = {1: "rospy", 2: "rclpy"}
 # The nodes end soon after a request; all their output is shown.
 _ROSLAUNCH: Final = (
     *("roslaunch", "--screen", "--skip-log-check", "--disable-title", "--no-summary"),
     *("--sigint-timeout=2", "--sigterm-timeout=1"),
 )
+# Of two values of an argument, the last one is taken: that of the user.
+_ROS2_LAUNCH: Final = ("launch", "--noninteractive", "--show-all-subprocesses-output")
+_ROS2_ARGUMENT: Final = "use_sim_time:=true"
 
 
 class ControllerError(FlatlandError):
@@ -64,7 +71,8 @@ def find_controller(name: str, folder: str) -> Callable[[Task], Any] | StackComm
 
     Args:
         name: Name of an included controller, `policy`, `FILE.onnx`, `FILE.py:NAME`, `MODULE:NAME`,
-            `FILE.launch ARGUMENTS` or `command: PROGRAM ARGUMENTS`.
+            `FILE.launch ARGUMENTS`, `FILE.launch.py ARGUMENTS` (or `.xml`, `.yaml`) or
+            `command: PROGRAM ARGUMENTS`.
         folder: Folder that a relative path of a file starts from; empty for the current one.
 
     Raises:
@@ -82,8 +90,8 @@ def find_controller(name: str, folder: str) -> Callable[[Task], Any] | StackComm
     if not (colon and module_name and attribute):
         raise ControllerError(
             f"{name!r} does not exist; included are {', '.join([*INCLUDED, POLICY])}, others are "
-            "given as FILE.py:NAME, MODULE:NAME, FILE.onnx, 'FILE.launch ARGUMENTS' or "
-            "'command: PROGRAM ARGUMENTS'"
+            "given as FILE.py:NAME, MODULE:NAME, FILE.onnx, 'FILE.launch ARGUMENTS', "
+            "'FILE.launch.py ARGUMENTS' or 'command: PROGRAM ARGUMENTS'"
         )
     try:
         if module_name.endswith(".py"):
@@ -111,14 +119,22 @@ def find_controller(name: str, folder: str) -> Callable[[Task], Any] | StackComm
 
 def is_stack(name: str) -> bool:
     """Returns whether a controller consists of ROS nodes."""
-    return name.startswith(_COMMAND) or name.split(" ", 1)[0].endswith(".launch")
+    return name.startswith(_COMMAND) or _version_of_file(name.split(" ", 1)[0]) is not None
+
+
+def _version_of_file(name: str) -> RosVersion | None:
+    """Returns the version of ROS of a launch file, None for another file."""
+    if name.endswith(_ROS1_FILE):
+        return 1
+    return 2 if _ROS2_FILE.search(name) else None
 
 
 def _stack_command(name: str, folder: str) -> StackCommand | None:
     """Returns what starts nodes; None for the name of another controller.
 
     Raises:
-        ControllerError: The file does not exist, or the arguments are not those of a shell.
+        ControllerError: The file does not exist, the arguments are not those of a shell, or ROS is
+            not installed.
     """
     if not is_stack(name):
         return None
@@ -129,13 +145,46 @@ def _stack_command(name: str, folder: str) -> StackCommand | None:
     if name.startswith(_COMMAND):
         if not words:
             raise ControllerError(f"{name!r}: expected a program after {_COMMAND!r}")
-        return StackCommand(tuple(words), "", folder)
+        return StackCommand(tuple(words), "", folder, _installed_version(name))
     file = Path(folder, words[0]).expanduser().absolute()
     if not file.is_file():
         raise ControllerError(f"file not found: {file}")
-    if importlib.util.find_spec("rospy") is None:
-        raise ControllerError(f"{name!r}: rospy is not installed, which launch files require")
-    return StackCommand((*_ROSLAUNCH, str(file), *words[1:]), str(file), folder)
+    version = _version_of_file(words[0]) or 1
+    client = _CLIENTS[version]
+    if importlib.util.find_spec(client) is None:
+        raise ControllerError(
+            f"{name!r}: {client} is not installed in {sys.executable}, which launch files of "
+            f"ROS {version} require"
+        )
+    if version == 1:
+        return StackCommand((*_ROSLAUNCH, str(file), *words[1:]), str(file), folder, 1)
+    program = shutil.which("ros2")
+    if program is None:
+        raise ControllerError(f"{name!r}: the program ros2, which starts it, is not on PATH")
+    command = (program, *_ROS2_LAUNCH, str(file), _ROS2_ARGUMENT, *words[1:])
+    return StackCommand(command, str(file), folder, 2)
+
+
+def _installed_version(name: str) -> RosVersion:
+    """Returns the version of ROS that this Python is connected to.
+
+    Raises:
+        ControllerError: There is none, or it is not known which of two is meant.
+    """
+    found = [version for version, client in _CLIENTS.items() if importlib.util.find_spec(client)]
+    if len(found) > 1:
+        chosen = os.environ.get("ROS_VERSION", "")
+        found = [version for version in found if str(version) == chosen]
+        if not found:
+            raise ControllerError(
+                f"{name!r}: rospy and rclpy are installed; set ROS_VERSION to 1 or 2, not "
+                f"{chosen!r}"
+            )
+    if not found:
+        raise ControllerError(
+            f"{name!r}: neither rospy nor rclpy is installed in {sys.executable}; nodes require one"
+        )
+    return found[0]
 
 
 def controller_digest(name: str, folder: str) -> str:

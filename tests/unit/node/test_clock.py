@@ -131,6 +131,21 @@ def test_the_simulated_time_is_published_with_each_step(transport: Any) -> None:
     assert topic.closed
 
 
+def test_the_ros_time_may_continue_when_the_simulated_time_starts_again(transport: Any) -> None:
+    clock = SimulatedClock(transport)
+    topic = transport.topics["/clock"]
+    topic.connect()
+    clock.time_advanced(3 * STEP)
+    for start in (3 * STEP, 5 * STEP):
+        clock.keep_time()
+        clock.time_advanced(0)
+        assert (topic.sent[-1], transport.time_ns, stamp(0)) == (start, start, start)
+        clock.time_advanced(2 * STEP)
+        assert (topic.sent[-1], stamp(2 * STEP)) == (start + 2 * STEP, start + 2 * STEP)
+    clock.close()
+    assert stamp(STEP) == STEP
+
+
 def test_with_a_limited_rate_a_time_is_published_once(transport: Any) -> None:
     clock = SimulatedClock(transport, rate=0.001)
     topic = transport.topics["/clock"]
