@@ -479,6 +479,7 @@ PLUGIN_SECTIONS = [
         Key("world_frame_id", "map"),
         Key("exclude", "[]", "names"),
         RATE,
+        AFTER_STEP,
     ),
     plugin(
         "Sonar",
