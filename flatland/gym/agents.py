@@ -21,7 +21,6 @@ from flatland.plugins.ackermann_drive import AckermannDrive
 from flatland.plugins.diff_drive import DiffDrive
 from flatland.plugins.laser import Laser
 from flatland.plugins.omni_drive import OmniDrive
-from flatland.plugins.pedestrians import Pedestrians
 from flatland.plugins.tricycle_drive import TricycleDrive
 from flatland.values import Twist
 
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
     from flatland.world import World
 
 
-# Their subclasses may do something else with a command or in their first update.
+# Subclasses of these, and of Laser, may do something else with a command or in their first update.
 _DRIVES = (AckermannDrive, DiffDrive, OmniDrive, TricycleDrive)
 _STEERED = (AckermannDrive, TricycleDrive)
 
@@ -69,17 +68,17 @@ class Agent:
     max_yaw_rate: float
 
 
-def omit_first_calls(world: World) -> None:
-    """Makes the core perform the first updates of a world, too, as far as nothing wants them.
+def omit_first_calls(agents: Iterable[Agent]) -> None:
+    """Makes the core perform the first updates of lasers and drives, too, if nothing wants them.
 
-    The results are the same; an episode begins without calls of included plugins.
+    The results are the same; an episode begins without calls of Python.
 
     Args:
-        world: A world that has not been stepped.
+        agents: Agents, the worlds of which have not been stepped.
     """
-    plugins = [*world.plugins, *(plugin for model in world.models for plugin in model.plugins)]
-    kinds = (Laser, Pedestrians, *_DRIVES)
-    world.plugin_host.jobs.omit_first_calls([each for each in plugins if type(each) in kinds])
+    for agent in agents:
+        known = [plugin for plugin in agent.model.plugins if type(plugin) in (Laser, *_DRIVES)]
+        agent.world.plugin_host.jobs.omit_first_calls(known)
 
 
 def find_agent(world: World, name: str, laser: str | None, command: str | None) -> Agent:

@@ -57,7 +57,7 @@ class Stock:
     def prepare(self, world: World) -> PreparedWorld:
         """Prepares the original or a copy, which has not changed."""
         agents = tuple(self._find_agents(world))
-        omit_first_calls(world)
+        omit_first_calls(agents)
         start = world.snapshot(original=self._shared)
         if self._shared is None:
             self._shared = start

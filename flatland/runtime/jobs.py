@@ -142,14 +142,14 @@ class Jobs:
     def omit_first_calls(self, plugins: Container[FlatlandPlugin]) -> None:
         """Treats the first updates of plugins like later ones, which are called only if wanted.
 
-        To be called before the first step.
+        To be called before the first step, for plugins whose functions only account for an update
+        that is not wanted, as `skipped` does.
 
         Args:
-            plugins: Plugins whose functions do no more for an update that is not wanted than
-                `skipped` does.
+            plugins: The plugins; their updates without `skipped` are not changed.
         """
         for job in self._jobs.values():
-            if job.plugin in plugins:
+            if job.plugin in plugins and job.update.skipped is not None:
                 job.was_called = True
 
     @property

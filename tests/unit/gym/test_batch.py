@@ -119,13 +119,12 @@ def test_an_exception_of_one_world_ends_the_steps_of_all(make: Make, room: Path)
     assert not env._stage.worlds[1].requests.lock._is_owned()
 
 
-@pytest.mark.parametrize("world", ["room", "crowd"])
 def test_first_updates_without_calls_have_the_same_results(
-    make: Make, room: Path, world: str, monkeypatch: pytest.MonkeyPatch
+    make: Make, room: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    env = create(make, room if world == "room" else world)
+    env = create(make, room)
     monkeypatch.setattr(Jobs, "omit_first_calls", lambda *_: None)
-    called = create(make, room if world == "room" else world)
+    called = create(make, room)
     assert run(env) == run(called)
 
 
