@@ -56,9 +56,10 @@ class StagedVector(Staged, VectorEnv[Any, Any, Any]):
         num_threads = checked_count("num_threads", num_threads, 0)
         if max_episode_steps is not None:
             settings = settings.limited_to(checked_count("max_episode_steps", max_episode_steps))
+        world_name = settings.world_name
         self._stage = Stage(
             settings,
-            [f"{settings.world_name} {number}" for number in range(num_worlds)],
+            [f"{world_name} {number}" for number in range(num_worlds)],
             agents_of,
             render_mode=render_mode,
             web_port=web_port,
