@@ -93,6 +93,7 @@ def _serve(options: argparse.Namespace) -> int:
             return
         if not is_stopped():
             _report(replay)
+            sys.stdout.flush()  # The program runs on.
 
     def load(file: Path) -> Replay:
         return Replay(file, check_files=not options.ignore_changes)
