@@ -136,7 +136,7 @@ class _ActionGoals:
         def receive_result(future: Any) -> None:
             found = future.result()
             if found.status in _UNSUCCESSFUL:
-                text = getattr(found.result, "error_msg", "")  # not in Jazzy
+                text = getattr(found.result, "error_msg", "")  # not in all distributions
                 self._give_up(number, _UNSUCCESSFUL[found.status], text)
 
         sent = self._client.send_goal_async(message, feedback_callback=receive_feedback)

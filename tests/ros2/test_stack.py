@@ -34,6 +34,12 @@ mode = sys.argv[1]
 if mode == "absent":
     print("no battery")
     sys.exit(4)
+# Modes in which the node serves an action.
+WITH_ACTION = ("navigates", "aborts", "rejects")
+if mode in WITH_ACTION:
+    from nav2_msgs.action import NavigateToPose
+    from rclpy.action import ActionServer, GoalResponse
+    from rclpy.task import Future
 
 
 def stamp_of(message):
@@ -47,7 +53,14 @@ class Driver(Node):
         self.poses = {}  # by the time of the odometry
         self.command_type = TwistStamped if mode == "stamped" else Twist
         self.commands = self.create_publisher(self.command_type, "cmd_vel", 10)
-        self.create_subscription(PoseStamped, "goal_pose", self.on_goal, 10)
+        self.count = 0  # of the commands
+        if mode in WITH_ACTION:
+            self.end = Future()  # of the goal
+            self.server = ActionServer(
+                self, NavigateToPose, "navigate_to_pose", self.execute, goal_callback=self.respond
+            )
+        else:
+            self.create_subscription(PoseStamped, "goal_pose", self.on_goal, 10)
         # The messages of several steps come at once.
         self.create_subscription(Odometry, "odometry/filtered", self.on_odometry, 100)
         self.create_subscription(LaserScan, "scan", self.on_scan, qos_profile_sensor_data)
@@ -60,6 +73,19 @@ class Driver(Node):
             found.header.frame_id, found.child_frame_id = "map", "odom"
             found.transform.translation.x = 0.2
             self.sender.publish(TFMessage(transforms=[found]))
+
+    def respond(self, goal):
+        return GoalResponse.REJECT if mode == "rejects" else GoalResponse.ACCEPT
+
+    async def execute(self, handle):
+        # As in Nav2, a new goal aborts the last one.
+        self.end.set_result("replaced")
+        self.end = Future()
+        self.on_goal(handle.request.pose)
+        handle.publish_feedback(NavigateToPose.Feedback(number_of_recoveries=2))
+        text = await self.end
+        handle.abort()
+        return NavigateToPose.Result(error_msg=text)
 
     def on_goal(self, message):
         self.goal = message.pose.position
@@ -89,8 +115,9 @@ class Driver(Node):
         pose, nearest = self.poses[stamp_of(self.scan)], min(self.scan.ranges)
         self.poses.clear()
         self.scan = None
-        if self.goal is None or mode == "silent":
+        if self.goal is None or mode == "silent" or (mode == "aborts" and self.count == 5):
             return
+        self.count += 1
         yaw = 2 * math.atan2(pose.orientation.z, pose.orientation.w)
         bearing = math.atan2(self.goal.y - pose.position.y, self.goal.x - pose.position.x) - yaw
         bearing = math.remainder(bearing, math.tau)
@@ -101,6 +128,8 @@ class Driver(Node):
         if mode == "nan":
             command.linear.x = math.nan
         self.commands.publish(message)
+        if mode == "aborts" and self.count == 5:
+            self.end.set_result("no valid plan")
 
 
 rclpy.init()
@@ -260,7 +289,26 @@ def test_a_stack_that_fails_is_a_failed_run(drive: Drive) -> None:
     assert "ended in each of 3 attempts (signal 9)" in errors["kills"]
 
 
-def test_an_action_without_its_package_is_a_failed_run(drive: Drive) -> None:
+def test_goals_are_sent_to_an_action(drive: Drive) -> None:
+    modes = ["navigates", "aborts", "rejects", "drive"]
+    rows = drive(*modes, goal_action="navigate_to_pose", start_time=5.0)
+    reached, aborted, rejected, absent = rows
+    assert (reached["outcome"], reached["goals"]) == ("reached", 2), reached["error"]
+    assert reached["recoveries"] == 4
+    for row, error in (aborted, "aborted the goal: no valid plan"), (rejected, "rejected the goal"):
+        assert (row["outcome"], row["passed"]) == ("gave_up", False), row["error"]
+        assert row["error"] == f"navigate_to_pose {error}"
+    # The measures are those until then.
+    assert aborted["recoveries"] == 2
+    assert 0 < aborted["time"] < 5
+    assert "the action navigate_to_pose is not available" in absent["error"]
+
+
+def test_an_action_without_its_package_is_a_failed_run(
+    drive: Drive, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folder / "nav2_msgs.py").touch()
+    monkeypatch.syspath_prepend(folder)  # also of worker processes
     (row,) = drive("drive", goal_action="navigate_to_pose")
     assert "--goal-action requires the package nav2_msgs" in row["error"]
 
