@@ -45,9 +45,9 @@ class Ros1:
         import rospy
         from rosmaster.master import Master
 
-        self._master = Master(0)
-        self._master.start()
-        self.environment["ROS_MASTER_URI"] = os.environ["ROS_MASTER_URI"] = self._master.uri
+        master = Master(0)
+        master.start()
+        self.environment["ROS_MASTER_URI"] = os.environ["ROS_MASTER_URI"] = master.uri
         inbound.install()
         rospy.init_node(_NODE, argv=[], disable_signals=True, disable_rostime=True)
         rospy.set_param("/use_sim_time", True)
@@ -63,14 +63,8 @@ class Ros1:
         return ""
 
     def close(self) -> None:
-        """Ends the node and the master."""
-        import rospy
-
+        """Ends the topics. The master and rospy end with the process."""
         self._registrar.close(_CLOSE_TIMEOUT)
-        ending = threading.Thread(target=rospy.signal_shutdown, args=("end of run",), daemon=True)
-        ending.start()
-        ending.join(_CLOSE_TIMEOUT)
-        self._master.stop()
 
 
 class _ActionGoals:
