@@ -122,10 +122,15 @@ class Batch:
                 alone = alone.copy()
                 alone[others] = False
             self._start(commands, alone, alone, n)
-            idle: list[int] = [] if acting is None else np.flatnonzero(~acting).tolist()
+            idle: list[int] = []
             try:
                 meanwhile()
-                idle = self._observe_beside(idle)
+                if acting is not None:
+                    standing = ~acting
+                    idle = self._observe_beside(standing.nonzero()[0].tolist())
+                    # For the next call, since this one waits for the other threads in any case.
+                    for row in self._core.not_permitted(standing) if is_free else ():
+                        self._permit(row)
             finally:
                 unfinished = self._finish(alone)
                 if alone is self._all:
@@ -181,6 +186,8 @@ class Batch:
             and not world.physics.has_materials
             and world.stepping.prepare_unattended()
         ):
+            twist = agent.command.value
+            self._commands[row] = twist.linear_x, twist.linear_y, twist.angular_z
             agent.command.follow(_Commands(self._commands, self._counts, row, world))
             agent.laser.last_scan = None
             return True

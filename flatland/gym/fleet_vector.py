@@ -187,7 +187,7 @@ class FleetVectorEnv(StagedVector):
             infos = self._finish(ended) if ended.any() else {}
             shown = self._is_running
         everyone = np.ones(self.num_envs, np.bool_)
-        infos.update(masked_infos(self._episodes, everyone))
+        infos.update(masked_infos(self._episodes))
         infos.update({"is_active": active, "_is_active": everyone})
         self._stage.show()
         return self._present(shown), rewards, terminated, truncated, infos

@@ -161,10 +161,9 @@ class FlatlandVectorEnv(StagedVector):
         # Only in the mode NEXT_STEP has any episode ended here.
         fresh = self._has_ended.copy()
         if fresh.any():
-            begun = np.flatnonzero(fresh)
-            self._episodes.step(
-                numbers, np.flatnonzero(~fresh), meanwhile=lambda: self._begin(begun)
-            )
+            (begun,) = fresh.nonzero()
+            (acting,) = (~fresh).nonzero()
+            self._episodes.step(numbers, acting, meanwhile=lambda: self._begin(begun))
         else:
             self._episodes.step(numbers)
         rewards, terminated, truncated = self._episodes.judge()
@@ -178,7 +177,7 @@ class FlatlandVectorEnv(StagedVector):
             self._has_ended = np.zeros(self.num_envs, np.bool_)
         else:
             self._has_ended = ended
-        infos.update(masked_infos(self._episodes, np.ones(self.num_envs, np.bool_)))
+        infos.update(masked_infos(self._episodes))
         self._stage.show()
         return self._present(), rewards, terminated, truncated, infos
 
@@ -256,17 +255,20 @@ def _checked_options(
     return reset, places
 
 
-def masked_infos(episodes: Episodes, mask: BoolArray) -> dict[str, Any]:
+def masked_infos(episodes: Episodes, mask: BoolArray | None = None) -> dict[str, Any]:
     """Returns the infos of some environments as arrays with masks.
 
     Args:
         episodes: The episodes of all environments.
-        mask: The environments, shape (n,).
+        mask: The environments, shape (n,); None for all.
     """
     infos: dict[str, Any] = {}
     for name, values in episodes.infos().items():
-        infos[name] = np.where(mask, values, np.zeros(1, values.dtype))
-        infos[f"_{name}"] = mask.copy()
+        if mask is None:
+            infos[name], infos[f"_{name}"] = values.copy(), np.ones(len(values), np.bool_)
+        else:
+            infos[name] = np.where(mask, values, np.zeros(1, values.dtype))
+            infos[f"_{name}"] = mask.copy()
     return infos
 
 
