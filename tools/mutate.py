@@ -115,6 +115,7 @@ _ROOMS = {
             "tests/unit/plugins/test_laser.py",
             "tests/unit/plugins/test_laser_noise.py",
             "tests/unit/plugins/test_laser_materials.py",
+            "tests/build/test_core_programs.py",
             "tests/unit/plugins/test_laser_batch.py",
             "tests/unit/plugins/test_moving_worlds.py",
             "tests/unit/physics",

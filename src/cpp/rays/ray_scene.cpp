@@ -84,7 +84,6 @@ void RayScene::clear() {
   solids_.clear();
   edge_bodies_.clear();
   edge_groups_.clear();
-  is_grouped_ = true;
 }
 
 void RayScene::become_copy_of(RayScene& source,
