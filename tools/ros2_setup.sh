@@ -19,6 +19,8 @@ compgen -G 'flatland/_core*.so' >/dev/null || fail "not set up, run 'make setup'
 venv=$root/build/ros2/$distribution
 
 mkdir -p build/ros2
+# The wheels contain package.xml files, which are not packages of a workspace that contains this clone.
+touch build/ros2/CATKIN_IGNORE build/ros2/COLCON_IGNORE
 exec 9>"build/ros2/.$distribution.lock"
 flock 9
 

@@ -32,8 +32,9 @@ def test_manifest(name: str) -> None:
 
 
 def test_catkin_and_colcon_find_their_own_packages() -> None:
-    found = catkin_pkg.find_packages(str(CHECKOUT), exclude_paths=[str(CHECKOUT / "build")])
-    assert not [path for path in found if path.startswith("ros2")]
+    # Without those of the wheels that `make ros2` installs into build/ros2.
+    found = catkin_pkg.find_packages(str(CHECKOUT))
+    assert not [path for path in found if path.startswith(("ros2", "build/ros2"))]
     found = catkin_pkg.find_packages(str(PACKAGES), ignore_markers={"COLCON_IGNORE"})
     assert sorted(package.name for package in found.values()) == NAMES
 
