@@ -59,9 +59,11 @@ def run_tests(number: int, arguments: list[str]) -> Run:
     results, log = FOLDER / f"run-{number}.xml", FOLDER / f"run-{number}.log"
     results.unlink(missing_ok=True)
     start = time.monotonic()
+    # As in `make test`: `python -m pytest` would import the package of the checkout.
+    pytest = Path(sys.executable).with_name("pytest")
     with log.open("w") as output:
         done = subprocess.run(  # noqa: S603
-            [sys.executable, "-m", "pytest", *arguments, f"--junitxml={results}"],
+            [pytest, *arguments, f"--junitxml={results}"],
             stdout=output,
             stderr=subprocess.STDOUT,
             check=False,

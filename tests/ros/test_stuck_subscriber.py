@@ -37,11 +37,10 @@ def stuck(ros: Any) -> Iterator[RawSubscriber]:
 def test_other_subscribers_receive_all_messages(ros: Any, stuck: RawSubscriber) -> None:
     del stuck
     scans = ros.ready_topic("/scan", LaserScan)
-    for _ in range(50):
-        now = ros.step(DURATION / 50)
-        # Ten scans at a time, which the buffers of a subscriber that reads can hold.
-        stamps = [scan.header.stamp.to_nsec() for scan in scans.take(10)]
-        assert stamps == list(range(now - 50_000_000, now, 5_000_000))
+    for _ in range(round(DURATION / 0.005)):
+        now = ros.step()
+        # One scan at a time: the queue of the publisher drops those that a busy reader is late for.
+        assert scans.next().header.stamp.to_nsec() == now - 5_000_000
     # Services are not affected either.
     assert ros.spawn("ball.model.yaml", "ball").success
 
