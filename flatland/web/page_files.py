@@ -1,7 +1,8 @@
-"""The files of the page, read and compressed once."""
+"""The files of the page, read once, and compressed when they are first requested."""
 
 from __future__ import annotations
 
+import functools
 import gzip
 import hashlib
 import re
@@ -24,21 +25,33 @@ _INDEX: Final = "index.html"
 _LINK: Final = re.compile(r'(?<= href=")[\w./-]+(?=")|(?<= src=")[\w./-]+(?=")')
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PageFile:
     """A file of the page.
 
     Attributes:
-        kind: Value of the header `Content-Type`.
+        suffix: Suffix of the name.
         content: The file.
-        compressed: The file, compressed by gzip; None for a format that is already compressed.
-        tag: Hash of the content.
     """
 
-    kind: str
+    suffix: str
     content: bytes
-    compressed: bytes | None
-    tag: str
+
+    @property
+    def kind(self) -> str:
+        """Value of the header `Content-Type`."""
+        return _TYPES[self.suffix]
+
+    @functools.cached_property
+    def compressed(self) -> bytes | None:
+        """The file, compressed by gzip; None for a format that is already compressed."""
+        # Without the time, which would make the file differ from start to start.
+        return gzip.compress(self.content, mtime=0) if self.suffix in _COMPRESSED else None
+
+    @functools.cached_property
+    def tag(self) -> str:
+        """Hash of the content."""
+        return hashlib.sha256(self.content).hexdigest()[:32]
 
 
 class PageFiles:
@@ -68,18 +81,12 @@ class PageFiles:
             return self.prefix + link[0] if link[0] in contents else link[0]
 
         text = _LINK.sub(versioned, contents.pop(_INDEX).decode())
-        self.index = _page_file(_INDEX, text.encode())
+        self.index = PageFile(".html", text.encode())
         self._assets = {
-            self.prefix + name: _page_file(name, content) for name, content in contents.items()
+            self.prefix + name: PageFile(Path(name).suffix, content)
+            for name, content in contents.items()
         }
 
     def asset(self, path: str) -> PageFile | None:
         """Returns the file with a path that begins with `prefix`, None if it does not exist."""
         return self._assets.get(path)
-
-
-def _page_file(name: str, content: bytes) -> PageFile:
-    suffix = Path(name).suffix
-    # Without the time, which would make the file differ from start to start.
-    compressed = gzip.compress(content, mtime=0) if suffix in _COMPRESSED else None
-    return PageFile(_TYPES[suffix], content, compressed, hashlib.sha256(content).hexdigest()[:32])
