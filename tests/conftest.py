@@ -33,8 +33,20 @@ settings.load_profile("flatland")
 
 _TESTS = Path(__file__).resolve().parent
 _CHECKOUT = _TESTS.parent
-# Tests that need a ROS master, a screen or a compiler, and take a while.
-_MARKED_FOLDERS = {"ros": "ros", "ros/viewer": "viewer", "build": "build", "web": "web"}
+# Tests that need a ROS master, a screen, a browser, a compiler or other programs, and take a while.
+_MARKED_PATHS = {
+    "ros": "ros",
+    "ros/viewer": "viewer",
+    "build": "build",
+    "web": "web",
+    "js": "programs",
+    "unit/bad_input/test_hostile_files.py": "programs",
+    "unit/cli/test_doctor.py": "programs",
+    "unit/cli/test_documentation.py": "programs",
+    "unit/cli/test_test.py": "programs",
+    "unit/scenarios/test_workers.py": "programs",
+    "unit/test_extras.py": "programs",
+}
 # Folders whose tests run in one process, since they share a workspace, a screen or a browser. The
 # tests of each other file run in one process.
 _GROUPED_FOLDERS = ("build/workspace", "ros/viewer", "web")
@@ -91,8 +103,12 @@ def pytest_collect_directory(path: Path, parent: pytest.Collector) -> _Folder:
 @functools.cache
 def _marks_of(path: Path) -> list[pytest.MarkDecorator]:
     """Returns the marks of the tests of a file."""
-    folders = [folder for folder in _MARKED_FOLDERS if _TESTS / folder in path.parents]
-    marks = [getattr(pytest.mark, _MARKED_FOLDERS[folder]) for folder in folders]
+    places = {path, *path.parents}
+    marks = [
+        getattr(pytest.mark, mark)
+        for name, mark in _MARKED_PATHS.items()
+        if _TESTS / name in places
+    ]
     return [*marks, pytest.mark.xdist_group(_group_of(path.relative_to(_TESTS).as_posix()))]
 
 

@@ -84,7 +84,7 @@ def test_controllers_that_regard_obstacles_touch_less(make: Make, tmp_path: Path
     path = worldgen.office(3, (20, 14)).write(tmp_path / "office", robot=included_robot())
     envs = make_envs(make, 8, path)
     rates = {
-        name: evaluate(kind(envs), envs, 16, seed=5).collision_rate
+        name: evaluate(kind(envs), envs, 8, seed=5).collision_rate
         for name, kind in CONTROLLERS.items()
     }
     assert rates["gap"] == 0

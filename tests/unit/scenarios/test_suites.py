@@ -34,7 +34,7 @@ def test_the_included_suites_have_no_errors():
 @pytest.mark.parametrize("name", NAMES)
 def test_each_scenario_of_a_suite_fits_its_world(name, tmp_path):
     for scenario in read_scenarios(SUITES / f"{name}.yaml"):
-        limits = type(scenario.limits)(time=1.0)
+        limits = type(scenario.limits)(time=0.3)
         short = type(scenario)(
             **{f: getattr(scenario, f) for f in scenario.__slots__} | {"limits": limits}
         )
