@@ -136,7 +136,9 @@ _ROOMS = {
             "tests/ros/transport",
             "tests/ros/markers",
             "tests/ros/interactive",
+            "tests/ros/test_plugin_ros.py",
             "tests/ros/test_web_topics.py",
+            "tests/ros/test_teleop.py",
         ),
     ),
     # Without tests that take long; each still serves for the file that it mirrors.

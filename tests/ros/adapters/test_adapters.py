@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import Vector3
+from rospy import Time
 from std_msgs.msg import Bool, String
 
 import flatland
+from flatland import values
+from flatland.node import values as node_values
 from flatland.ros.adapters import find_adapter, register_adapter
 
 STAMP = 1_234_567_890_987_654_321  # more digits than a float can represent
@@ -193,6 +196,113 @@ def test_collisions() -> None:
     assert [(p.x, p.y) for p in first.contact_normals] == [(0.0, 1.0), (1.0, 0.0)]
     assert second.body_A == "fork"
     assert (list(second.magnitude_forces), second.contact_positions) == ([], [])
+
+
+def test_people() -> None:
+    poses = np.array([(1.0, 2.0, 2.0), (3.0, 4.0, 0.0)])
+    message = sent(values.People(STAMP, "map", ("a", "b"), poses))
+    assert header(message) == (1_234_567_890, 987_654_321, "map")
+    assert [(p.position.x, p.position.y, p.position.z) for p in message.poses] == [
+        (1.0, 2.0, 0.0),
+        (3.0, 4.0, 0.0),
+    ]
+    assert quaternion(message.poses[0].orientation) == (0, 0, math.sin(1.0), math.cos(1.0))
+
+
+def states_of(message: Any) -> list[tuple[float, ...]]:
+    """Returns the pose and the velocity of each model or person, after a check of the rest."""
+    assert header(message) == (1_234_567_890, 987_654_321, "map")
+    assert all((t.linear.z, t.angular.x, t.angular.y) == (0, 0, 0) for t in message.twist)
+    return [
+        (pose.x, pose.y, pose.theta, twist.linear.x, twist.linear.y, twist.angular.z)
+        for pose, twist in zip(message.pose, message.twist, strict=True)
+    ]
+
+
+STATES = np.arange(12.0).reshape(2, 6)
+
+
+def test_people_states() -> None:
+    message = sent(
+        values.PeopleStates(
+            STAMP,
+            "map",
+            ("a", "b"),
+            STATES[:, :3],
+            ("staff", "guests"),
+            STATES[:, 3:],
+            np.array([True, False]),
+        )
+    )
+    assert (message.name, message.group) == (["a", "b"], ["staff", "guests"])
+    np.testing.assert_array_equal(states_of(message), STATES)
+    assert list(message.standing) == [True, False]
+
+
+def test_model_states() -> None:
+    names = ("r1", "\udcff")  # undecodable bytes cannot be sent
+    message = sent(
+        node_values.StampedModelStates(
+            STAMP, "map", names, ("fleet", ""), STATES[:, :3], STATES[:, 3:]
+        )
+    )
+    assert message.name[0] == "r1"
+    assert message.name[1].isprintable()
+    assert message.ns == ["fleet", ""]
+    np.testing.assert_array_equal(states_of(message), STATES)
+
+
+def test_joint_state() -> None:
+    message = sent(flatland.JointState(STAMP, ("left", "right"), (1.0, 2.0), (3.0, 4.0)))
+    assert header(message) == (1_234_567_890, 987_654_321, "")
+    assert message.name == ["left", "right"]
+    assert (list(message.position), list(message.velocity)) == ([1.0, 2.0], [3.0, 4.0])
+    assert list(message.effort) == []
+
+
+GRID = flatland.OccupancyGrid((1.0, -2.0, 2.0), 0.25, np.array([[0, 100, -1], [50, 0, 0]], np.int8))
+
+
+def check_metadata(message: Any) -> None:
+    stamp = message.map_load_time
+    assert (stamp.secs, stamp.nsecs) == (1_234_567_890, 987_654_321)
+    assert (message.resolution, message.width, message.height) == (0.25, 3, 2)
+    origin = message.origin
+    assert (origin.position.x, origin.position.y, origin.position.z) == (1.0, -2.0, 0.0)
+    assert quaternion(origin.orientation) == (0, 0, math.sin(1.0), math.cos(1.0))
+
+
+def test_map() -> None:
+    check_metadata(sent(node_values.MapMetadata(STAMP, GRID)))
+    message = sent(node_values.PublishedMap(STAMP, GRID, "floor"))
+    assert header(message) == (1_234_567_890, 987_654_321, "floor")
+    check_metadata(message.info)
+    assert list(message.data) == [0, 100, -1, 50, 0, 0]  # row by row, that at the bottom first
+
+
+def test_diagnostics(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rospy.get_rostime", lambda: Time(12, 34))  # no node has been started
+    level = node_values.Level
+    statuses = (
+        node_values.Status("loop", level.OK, "fine", {}),
+        node_values.Status("plugins", level.ERROR, "late", {"laser": "3 times", "\udcff": "1"}),
+    )
+    message = sent(node_values.Diagnostics(statuses))
+    assert header(message) == (12, 34, "")
+    first, second = message.status
+    assert (first.level, first.name, first.message, first.values) == (0, "loop", "fine", [])
+    assert (second.level, second.name, second.message) == (2, "plugins", "late")
+    assert {each.hardware_id for each in message.status} == {"flatland"}
+    laser, other = second.values
+    assert (laser.key, laser.value) == ("laser", "3 times")
+    assert other.key.isprintable()
+
+
+def test_names_of_debug_topics() -> None:
+    assert sent(node_values.DebugTopicNames(("layer/2d", "model/r"))).topics == [
+        "layer/2d",
+        "model/r",
+    ]
 
 
 def test_bool_and_twist_are_converted_in_both_directions() -> None:

@@ -23,13 +23,6 @@ STAMPED = "/flatland_tests/stamped"
 PLAIN = "/flatland_tests/plain"
 
 
-@pytest.fixture
-def registrar(ros: Any) -> Iterator[Registrar]:
-    registrar = Registrar()
-    yield registrar
-    registrar.close(TIMEOUT)
-
-
 def serialized(message: Any) -> bytes:
     buffer = BytesIO()
     message.serialize(buffer)

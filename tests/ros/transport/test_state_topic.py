@@ -46,13 +46,6 @@ def state() -> State:
 
 
 @pytest.fixture
-def registrar(ros: Any) -> Iterator[Registrar]:
-    registrar = Registrar()
-    yield registrar
-    registrar.close(TIMEOUT)
-
-
-@pytest.fixture
 def topic(registrar: Registrar, state: State) -> Iterator[StateTopic]:
     topic = StateTopic(
         registrar, TOPIC, Int32, state.make, state.post, on_connection=state.connections.append

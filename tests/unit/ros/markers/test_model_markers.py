@@ -64,6 +64,15 @@ def test_poses_are_replaced_in_place(model: Any) -> None:
         assert message.packed == by_genpy(message)
 
 
+def test_markers_are_created_again_only_if_the_appearance_has_changed(model: Any) -> None:
+    cached = ModelMarkers(model, RosWriter)
+    first = cached.message(0)
+    model.bodies[1].set_pose(1.0, 2.0, 0.3)
+    assert cached.message(STAMP) is first
+    model.bodies[1].color = (0.0, 1.0, 0.0, 1.0)
+    assert cached.message(STAMP) is not first
+
+
 def test_joints_connect_the_origins_and_the_anchors(model: Any) -> None:
     cached = ModelMarkers(model, RosWriter)
     cached.message(0)
