@@ -67,5 +67,6 @@ def test_a_service_that_is_closed_before_its_registration_is_never_offered(
 
     registrar.submit(open_and_close)
     assert registrar.flush(TIMEOUT)
+    assert registrar.flush(TIMEOUT)  # also what the action has submitted
     assert not opened[0].ready
     assert providers(ros) == []
