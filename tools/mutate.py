@@ -34,6 +34,8 @@ from mutations import Mutation, mutations
 _CHECKOUT = Path(__file__).resolve().parents[1]
 _COPIES = _CHECKOUT / "build" / "mutate"
 _EQUIVALENT = "tools/mutate_equivalent.txt"
+# Variable of the environment of all programs that tests of a change start.
+_MARK = "FLATLAND_MUTATION"
 # What the build writes into the source tree, in addition to the files of git.
 _BUILT = ("flatland/_core*.so", "flatland/msg/*.py", "flatland/srv/*.py", "flatland_msgs/**/*.py")
 
@@ -136,6 +138,7 @@ _ROOMS = {
             "tests/ros/transport",
             "tests/ros/markers",
             "tests/ros/interactive",
+            "tests/ros/test_msgs_package.py",
             "tests/ros/test_plugin_ros.py",
             "tests/ros/test_web_topics.py",
             "tests/ros/test_teleop.py",
@@ -374,6 +377,7 @@ class Copy:
             "PYTHONPATH": f"{folder}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
             "PYTHONDONTWRITEBYTECODE": "1",
             "CCACHE_BASEDIR": str(folder),
+            _MARK: str(folder),
         }
         if compile_core:
             (folder / "build").mkdir(exist_ok=True)
@@ -400,10 +404,14 @@ class Copy:
         process.start()
         process.join(limit)
         code = process.exitcode
-        # Also programs that the tests have started.
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid or 0, signal.SIGKILL)
         process.join()
+        # Not at the top: the processes of the tests import this file, and flatland from the copy.
+        from flatland.scenarios.programs import end_marked
+
+        # Programs that the tests have started are in groups of their own.
+        end_marked(str(self.folder), _MARK)
         if code is None:
             return Result("timeout")
         text = log.read_text(errors="replace")

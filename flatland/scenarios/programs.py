@@ -30,13 +30,14 @@ def new_mark() -> str:
     return uuid.uuid4().hex
 
 
-def end_marked(mark: str) -> None:
+def end_marked(mark: str, variable: str = MARK) -> None:
     """Ends all processes with a mark by the signal KILL, also those that have left their group.
 
     Args:
-        mark: Value of `MARK`.
+        mark: Value of the variable.
+        variable: Variable of the environment that the processes have inherited.
     """
-    wanted = f"{MARK}={mark}".encode()
+    wanted = f"{variable}={mark}".encode()
     # A process may start another one meanwhile.
     while processes := _marked(wanted):
         for process in processes:
