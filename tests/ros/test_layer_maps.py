@@ -58,6 +58,9 @@ class Scans:
     def __init__(self, ros: Any) -> None:
         self._ros = ros
         self._topic = ros.ready_topic("/r/scan", LaserScan)
+        # The connection of the previous test may have counted as that of this one.
+        while not self._topic.rest():
+            ros.step(0.1)
 
     def ahead(self) -> float:
         self._ros.step(0.1)  # the period of the laser
