@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from message_queue import MessageQueue
-from programs import Program
+from programs import SILENCE, Program
 from room_world import write_room_world
 from waiting import TIMEOUT, wait_until
 
@@ -189,8 +189,9 @@ class Launcher:
 
     def start(self, *arguments: str, **parameters: object) -> Program:
         """Starts a simulator with arguments of ROS, without waiting for it."""
-        # On a busy machine, a node may need longer than its default to end.
-        parameters = {"shutdown_timeout": TIMEOUT, **parameters}
+        # On a busy machine, a node may need longer than its default to end. One that hangs logs
+        # where before it is ended for its silence.
+        parameters = {"shutdown_timeout": SILENCE * 2 / 3, **parameters}
         given = [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
         module = [sys.executable, "-m", "flatland.ros2"]
         return self.program(*module, "--ros-args", *given, *arguments)
