@@ -204,6 +204,15 @@ class TestModes:
         world.step(300)
         assert pose(world)[0] == pytest.approx(1.0, abs=1e-6)
 
+    def test_once_visits_all_waypoints_after_each_start(self, follow: Any) -> None:
+        world = follow("waypoints: [[1, 0], [1, 1]], mode: once, start: false, start_topic: go")
+        for corner, end in ((1.0, 1.0), (1.0, 0.0), (1.0, 1.0)):
+            world.command("/go").set(True)
+            world.step(100)
+            assert pose(world)[0] == pytest.approx(corner, abs=1e-6)
+            world.step(300)
+            assert pose(world)[:2] == pytest.approx((end, end), abs=1e-6)
+
     def test_false_stops_at_the_next_waypoint(self, follow: Any) -> None:
         world = follow("waypoints: [[1, 0], [2, 0]], start_topic: go")
         world.step(50)
