@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import threading
 from functools import partial
 from typing import Any
 
 import pytest
+from waiting import TIMEOUT
 
 from flatland.node.diagnostics import DiagnosticsTopic, _Costs, _Drops, _Rate
-from flatland.node.values import Level
+from flatland.node.values import Level, Status
 from flatland.runtime.plugin_costs import PluginCosts
 from flatland.simulation import CycleStatistics, Simulation
 
@@ -192,3 +194,112 @@ def test_subscribers_that_do_not_keep_up_are_named(transport: Any) -> None:
     )
     assert status.values["/scan to /rviz"] == "3 messages dropped"
     assert (drops.status().level, drops.status().text) == (Level.OK, "all keep up")
+
+
+def test_disabled_plugins_are_an_error(world: Any) -> None:
+    (plugin,) = world.model("r").plugins
+    costs = _Costs(world)
+    costs._measured.append((0.5, {("DiffDrive", DRIVE.removesuffix(" [%]")): 0.1}))
+    world.plugin_host.disabled.add(plugin)
+    name = DRIVE.removesuffix(" [%]")
+    assert costs.status() == Status(
+        "plugins",
+        Level.ERROR,
+        f"1 disabled after errors: {name}",
+        {DRIVE: "20.00", "all of type DiffDrive [%]": "20.00", "disabled": name},
+    )
+
+
+def test_the_largest_costs_are_listed_first(world: Any) -> None:
+    costs = _Costs(world)
+    shares = {(f"T{number % 30}", f"p{number}"): 0.001 * (number % 30 + 1) for number in range(30)}
+    for _ in range(11):  # of which ten count
+        costs._measured.append((0.5, shares))
+    costs._measured.append((1.0, {}))
+    status = costs.status()
+    order = list(range(29, 9, -1))
+    elapsed = 9 * 0.5 + 1.0
+    expected = [f"{100 * 9 * 0.001 * (number + 1) / elapsed:.2f}" for number in order]
+    assert list(status.values) == [
+        *(f"p{number} [%]" for number in order),
+        *(f"all of type T{number} [%]" for number in order),
+    ]
+    assert list(status.values.values()) == expected * 2
+    assert status.text == f"{100 * 9 * 0.001 * 465 / elapsed:.1f} % of the wall time"
+    assert (status.name, status.level) == ("plugins", Level.OK)
+
+
+def test_a_measurement_that_ends_while_paused_is_discarded(world: Any) -> None:
+    costs = _Costs(world)
+    costs.begin(0.0)
+    world.step()
+    world.pause()
+    costs.end(0.2)
+    assert keys(costs) == []
+
+
+def test_a_message_has_the_statuses_of_the_node(
+    world: Any, transport: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [100.0]
+    monkeypatch.setattr("flatland.node.diagnostics.time.perf_counter", lambda: now[0])
+    diagnostics = DiagnosticsTopic(transport, Simulation(world, 100.0))
+    topic = transport.topics["/diagnostics"]
+    topic.connected = True
+    sent = []
+    try:
+        assert diagnostics._ticker.period == 0.2
+        for tick in range(12):
+            diagnostics._tick(0.0)
+            sent.append(len(topic.sent))
+            # Costs are measured from the tick of a message to the next one.
+            assert (world.plugin_host.costs is not None) is (tick % 5 == 0)
+            world.step(8)
+            now[0] += 0.2
+        # The measurement between the messages has begun at the first of the two.
+        elapsed = [seconds for seconds, _ in diagnostics._costs._measured]
+        assert elapsed == pytest.approx([0.2] * 3)
+    finally:
+        diagnostics.close()
+    assert sent == [0] * 5 + [1] * 5 + [2] * 2
+    for message in topic.sent:
+        assert [(status.name, status.level) for status in message] == [
+            ("flatland_server: simulation", Level.OK),
+            ("flatland_server: plugins", Level.OK),
+            ("flatland_server: subscribers", Level.OK),
+        ]
+        assert message[0].text == "40.0 steps per second"
+        assert message[2].text == "all keep up"
+    # A subscriber that comes back receives nothing about the time without one.
+    topic.connected = False
+    assert not diagnostics._tick(0.0)
+    assert diagnostics._ticks == 0
+    assert list(diagnostics._costs._measured) == []
+
+
+def test_a_subscriber_wakes_the_topic(world: Any, transport: Any) -> None:
+    posted = threading.Event()
+    simulation = Simulation(world)
+    simulation.post = lambda _action: posted.set()  # type: ignore[method-assign,assignment]
+    diagnostics = DiagnosticsTopic(transport, simulation)
+    topic = transport.topics["/diagnostics"]
+    assert not posted.is_set()
+    topic.connected = True
+    topic._on_connection(True)
+    assert posted.wait(TIMEOUT)
+    diagnostics.close()
+    assert diagnostics._ticker.closed
+
+
+def test_lost_time_counts_from_the_previous_message(world: Any) -> None:
+    simulation = Simulation(world, 100.0)
+    rate = _Rate(simulation)
+    simulation.lost_time = 0.6
+    assert rate.status(1.0).values["lost time [s]"] == "0.600"
+    simulation.lost_time = 0.7
+    # One per cent of the time may be lost.
+    status = rate.status(11.0)
+    assert status.values["lost time [s]"] == "0.100"
+    assert status.level is Level.OK
+    simulation.lost_time = 0.81
+    assert rate.status(21.0).level is Level.WARN

@@ -27,10 +27,16 @@ def fail():
 class Failing(flatland.ModelPlugin):
     def fail(self):
         raise RuntimeError("cause")
+
+
+class OfWorld(flatland.WorldPlugin):
+    pass
 """
 MANIFEST = """
 <library path="."><class name="test::Failing" type="failing_plugin_of_reports.Failing"
-  base_class_type="flatland::ModelPlugin"/></library>
+  base_class_type="flatland::ModelPlugin"/>
+<class name="test::OfWorld" type="failing_plugin_of_reports.OfWorld"
+  base_class_type="flatland::WorldPlugin"/></library>
 """
 ROBOT = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
@@ -96,6 +102,39 @@ def test_an_exception_is_attributed_to_the_plugin_that_raised_it(
     )
     assert record.exc_info is not None
     assert str(record.exc_info[1]) == "cause"
+
+
+def test_an_exception_in_a_file_of_several_plugins_names_all_of_them(
+    reports: FaultReports,
+    files: Any,
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    files.write("failing_plugin_of_reports.py", PLUGIN)
+    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", files.write("manifest.xml", MANIFEST))
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.delitem(sys.modules, "failing_plugin_of_reports", raising=False)
+    files.write("robot.model.yaml", ROBOT)
+    reports.world = files.load(
+        "{properties: {}, layers: [{name: 2d}], models: [{name: r, model: robot.model.yaml}], "
+        'plugins: [{type: "test::OfWorld", name: outer}]}'
+    )
+    run_thread(sys.modules["failing_plugin_of_reports"].fail)
+    assert [record.getMessage() for record in caplog.records] == [
+        'thread "worker" of World Plugin "outer" type "test::OfWorld" or Model Plugin "bad" type '
+        '"test::Failing" model "r" ended with an exception'
+    ]
+
+
+def test_an_exception_without_a_thread_and_a_value_is_reported(
+    reports: FaultReports, caplog: pytest.LogCaptureFixture
+) -> None:
+    """As Python calls the hook during its own shutdown."""
+    threading.excepthook(threading.ExceptHookArgs((ValueError, None, None, None)))
+    [record] = caplog.records
+    assert record.getMessage() == 'thread "unknown" ended with an exception'
+    assert record.exc_info is not None
+    assert isinstance(record.exc_info[1], ValueError)
 
 
 def test_an_exception_of_other_code_is_attributed_to_its_thread_only(

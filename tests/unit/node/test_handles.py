@@ -33,6 +33,7 @@ class FakeServer:
         self.moved: list[str] = []
         self.inserted: list[str] = []
         self.keep_alives = 0
+        self.applied = 0
 
     def insert(self, _model: object, name: str) -> None:
         self.handles.add(name)
@@ -45,7 +46,7 @@ class FakeServer:
         self.moved.append(name)
 
     def apply_changes(self) -> None:
-        pass
+        self.applied += 1
 
     def keep_alive(self) -> None:
         self.keep_alives += 1
@@ -60,7 +61,12 @@ class Setup:
         self.simulation = Simulation(world)
         self.posted: list[object] = []  # ticks that wait; the test ticks itself
         thread = TickerThread("handles", self._post)
-        self.handles = Handles(self.simulation, thread, lambda _post, _handles: self.server)
+        self.started: list[object] = []
+        self.handles = Handles(self.simulation, thread, self._start_server)
+
+    def _start_server(self, *arguments: object) -> FakeServer:
+        self.started += arguments
+        return self.server
 
     def _post(self, action: object) -> Future[Any]:
         self.posted.append(action)
@@ -191,3 +197,88 @@ def test_the_handle_of_a_model_with_other_colors_is_replaced(setup: Setup) -> No
     setup.world.set_appearance("b", color=(1.0, 0.0, 0.0, 1.0))
     assert setup.server.inserted == ["a", "b", "b"]
     assert setup.server.handles == {"a", "b"}
+
+
+def test_the_server_posts_to_the_simulation_and_passes_feedback_on(setup: Setup) -> None:
+    assert setup.started == [setup.simulation.post, setup.handles]
+
+
+def test_feedback_that_is_no_drag_changes_nothing(setup: Setup) -> None:
+    setup.send("a", Event.KEEP_ALIVE, time=5.0)
+    setup.send("a", Event.MENU, entry=DELETE_ENTRY + 1)
+    assert not setup.world.paused
+    assert setup.server.handles == {"a", "b"}
+    assert setup.server.moved == []
+    assert not setup.posted
+
+
+def test_a_drag_ticks_until_it_ends_also_without_clients(setup: Setup) -> None:
+    setup.server.connected = False
+    setup.send("a", Event.PRESS, time=1.0)
+    wait_until("a tick", lambda: setup.posted)
+    assert setup.handles._tick(1.05) is True
+    setup.send("a", Event.RELEASE, time=1.2)
+    assert setup.handles._tick(1.3) is False
+
+
+@pytest.mark.parametrize(
+    ("pose", "moved"),
+    [
+        ((0.0, 0.0, 0.1), True),
+        ((0.0, 0.0, -0.1), True),
+        ((0.1, 0.0, 0.0), True),
+        ((0.0, -0.1, 0.0), True),
+        ((0.0, 0.0, 2.0 * math.pi), False),
+        ((1e-7, -1e-7, 1e-7), False),
+    ],
+)
+def test_a_changed_pose_is_published(
+    setup: Setup, pose: tuple[float, float, float], moved: bool
+) -> None:
+    setup.world.move_model("a", pose)
+    setup.handles._tick(1.0)
+    assert setup.server.moved == (["a"] if moved else [])
+    assert setup.server.applied == 1
+
+
+def test_changes_are_applied_at_once_without_clients(setup: Setup) -> None:
+    setup.world.delete_model("b")
+    assert setup.server.applied == 0  # by the next tick
+    setup.server.connected = False
+    setup.world.set_appearance("a", color=(1.0, 0.0, 0.0, 1.0))
+    assert setup.server.applied == 1
+    setup.world.delete_model("a")
+    assert setup.server.applied == 2
+    assert setup.server.handles == set()
+
+
+def test_nothing_happens_after_the_end(setup: Setup) -> None:
+    setup.handles.close()
+    setup.send("a", Event.PRESS)
+    assert not setup.world.paused
+    setup.world.set_appearance("b", color=(1.0, 0.0, 0.0, 1.0))
+    setup.world.spawn_model(setup.world.model("a").path, "c", pose=(0.0, 5.0, 0.0))
+    setup.world.delete_model("b")
+    assert setup.server.inserted == ["a", "b"]
+    assert setup.server.handles == {"a", "b"}
+
+
+@pytest.mark.parametrize("keep", [False, True])
+def test_a_drag_keeps_the_odometry_on_request(
+    setup: Setup, monkeypatch: pytest.MonkeyPatch, keep: bool
+) -> None:
+    options: list[Any] = []
+    thread = TickerThread("handles", setup._post)
+    if keep:
+        handles = Handles(
+            setup.simulation, thread, lambda *_: FakeServer(), move_keeps_odometry=True
+        )
+    else:
+        handles = Handles(setup.simulation, thread, lambda *_: FakeServer())
+    monkeypatch.setattr(
+        setup.world, "move_model", lambda *_, **given: options.append(given), raising=True
+    )
+    pose = ReceivedPose("", (1.0, 2.0, 0.0))
+    handles.receive(Feedback("a", "rviz", Event.RELEASE, 0, pose, 0.0))
+    handles.close()
+    assert options == [{"if_blocked": "allow", "keep_odometry": keep}]

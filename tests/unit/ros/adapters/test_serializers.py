@@ -24,7 +24,7 @@ from flatland.node import values as node_values
 from flatland.node.adapters.marker import Marker, write_marker, write_markers
 from flatland.node.adapters.people_markers import HEIGHT
 from flatland.node.adapters.serializers import SERIALIZERS
-from flatland.node.adapters.writer import FLOAT32, Writer
+from flatland.node.adapters.writer import FLOAT32, LAYOUTS, Writer
 from flatland.node.stamps import set_stamps
 from flatland.ros.adapters.writer import RosWriter
 from flatland.ros2 import ros_time
@@ -347,6 +347,19 @@ def test_arrays_of_other_shapes_are_refused(writer: type[Writer]) -> None:
     for points in (np.zeros((2, 2)), np.zeros(3)):
         with pytest.raises(ValueError, match=r"points must have shape \(n, 3\), got "):
             write_marker(Marker(points=points), writer())
+
+
+def test_lists_of_different_length_are_refused() -> None:
+    tracked = values.TrackedPeople(STAMP, "", NAMES, ROWS[:1], GROUPS, ROWS, np.zeros(2, bool))
+    with pytest.raises(ValueError, match="shorter"):
+        SERIALIZERS[values.TrackedPeople](tracked, RosWriter())
+    for changes in ({"groups": GROUPS[:1]}, {"velocities": ROWS[:1]}, {"ids": (4,)}):
+        with pytest.raises(ValueError, match="shorter"):
+            SERIALIZERS[values.PeopleMarkers](people(**changes), RosWriter())
+
+
+def test_at_most_16_numbers_are_written_at_once() -> None:
+    assert {len(layouts) for layouts in LAYOUTS.values()} == {17}
 
 
 @pytest.mark.parametrize(("writer", "encode"), FORMATS)
