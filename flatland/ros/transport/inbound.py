@@ -133,7 +133,6 @@ class TcprosServer(rospy.impl.tcpros_base.TCPServer):  # type: ignore[misc]
 
     def run(self) -> None:
         """Accepts connections until the node ends; called by rospy in a separate thread."""
-        self.is_shutdown = False
         self._warnings = LimitedLog()
         self._pending: dict[int, _Handshake] = {}  # by file descriptor, the oldest first
         self._max_pending = connection_limit(MAX_CONNECTIONS)
