@@ -257,8 +257,7 @@ class _RequestHandler(rosgraph.xmlrpc.SilenceableXMLRPCRequestHandler):  # type:
         """Handles one request, unless it is too large."""
         with suppress(ValueError):
             if int(self.headers.get("content-length", 0)) > MAX_REQUEST_SIZE:
-                self.close_connection = True
-                self.send_error(413)
+                self.send_error(413)  # also closes the connection
                 return
         with self.server.handling(self.request):
             super().do_POST()

@@ -303,3 +303,13 @@ def test_lost_time_counts_from_the_previous_message(world: Any) -> None:
     assert status.level is Level.OK
     simulation.lost_time = 0.81
     assert rate.status(21.0).level is Level.WARN
+
+
+def test_a_world_that_stands_still_has_no_steps(world: Any) -> None:
+    rate = _Rate(Simulation(world, 100.0))
+    world.step(50)
+    rate.status(1.0)
+    assert rate.status(2.0).text == "0.0 steps per second"
+    world.step(100)
+    values = rate.status(4.0).values
+    assert (values["steps per second"], values["real-time factor"]) == ("50.0", "0.250")
