@@ -23,6 +23,7 @@ from visualization_msgs.msg import Marker
 from flatland.errors import FlatlandError
 from flatland.geometry import quaternion_from_yaw
 from flatland.node.foreign_topics import pose_publisher, topics
+from flatland.node.foreign_topics.subscriptions import TopicSubscription
 from flatland.node.foreign_topics.topics import RosTopics
 from flatland.node.values import FrameParents
 from flatland.ros.adapters.writer import RosWriter
@@ -437,6 +438,16 @@ def test_values_are_those_of_the_newest_message_at_a_limited_rate(setup: Setup) 
     assert setup.update(drawn="/value").values == {}  # drawn only
 
 
+@pytest.mark.parametrize(("keeps_all", "kept"), [(False, 1), (True, 1000)])
+def test_messages_that_nobody_takes_are_limited(setup: Setup, keeps_all: bool, kept: int) -> None:
+    subscription = TopicSubscription(setup.transport, "/t", Float64, keeps_all=keeps_all)  # type: ignore[arg-type]
+    for number in range(1001):
+        setup.receive("/t", number)
+    assert subscription.take() == list(range(1001 - kept, 1001))
+    assert subscription.take() == []
+    assert subscription.latest == 1000
+
+
 # -- transforms ------------------------------------------------------------------------------------
 
 
@@ -468,6 +479,19 @@ def test_a_world_that_does_not_answer_prevents_no_drawing(setup: Setup, error: E
     setup.update(drawn="/plan")
     setup.receive("/plan", path(1.0, 2.0))
     assert xs(setup.update(drawn="/plan").drawings["/plan"]) == [1.0, 2.0]
+
+
+def test_a_world_whose_plugin_blocks_is_not_waited_for(setup: Setup) -> None:
+    limits: list[float] = []
+
+    def result(timeout: float) -> list[Any]:
+        limits.append(timeout)
+        return []
+
+    setup.simulation.post = lambda _action: SimpleNamespace(result=result)  # type: ignore[method-assign,assignment,return-value]
+    setup.graph.published = {"/plan": "nav_msgs/Path"}
+    setup.update(drawn="/plan")
+    assert limits == [1.0]
 
 
 def test_transforms_that_cannot_be_received_are_a_warning(setup: Setup, caplog: Any) -> None:
