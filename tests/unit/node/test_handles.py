@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from waiting import wait_until
 
-from flatland.node.handles import DELETE_ENTRY, Event, Feedback, Handles
+from flatland.node.handles import DELETE_ENTRY, DRAG_TIMEOUT, Event, Feedback, Handles
 from flatland.node.ticker import TickerThread
 from flatland.node.values import ReceivedPose
 from flatland.simulation import Simulation
@@ -34,13 +34,15 @@ class FakeServer:
         self.inserted: list[str] = []
         self.keep_alives = 0
         self.applied = 0
+        self.erased: list[str] = []
 
     def insert(self, _model: object, name: str) -> None:
         self.handles.add(name)
         self.inserted.append(name)
 
     def erase(self, name: str) -> None:
-        self.handles.discard(name)
+        self.handles.remove(name)
+        self.erased.append(name)
 
     def move(self, name: str) -> None:
         self.moved.append(name)
@@ -196,20 +198,75 @@ def test_the_handle_of_a_model_with_other_colors_is_replaced(setup: Setup) -> No
     assert setup.server.inserted == ["a", "b"]
     setup.world.set_appearance("b", color=(1.0, 0.0, 0.0, 1.0))
     assert setup.server.inserted == ["a", "b", "b"]
+    assert setup.server.erased == ["b"]
     assert setup.server.handles == {"a", "b"}
+    setup.handles._tick(1.0)
+    assert setup.server.moved == ["b"]  # Clients show the pose of the new handle.
 
 
 def test_the_server_posts_to_the_simulation_and_passes_feedback_on(setup: Setup) -> None:
     assert setup.started == [setup.simulation.post, setup.handles]
 
 
-def test_feedback_that_is_no_drag_changes_nothing(setup: Setup) -> None:
+def test_feedback_that_is_no_drag_changes_nothing(
+    setup: Setup, caplog: pytest.LogCaptureFixture
+) -> None:
     setup.send("a", Event.KEEP_ALIVE, time=5.0)
     setup.send("a", Event.MENU, entry=DELETE_ENTRY + 1)
     assert not setup.world.paused
     assert setup.server.handles == {"a", "b"}
     assert setup.server.moved == []
     assert not setup.posted
+    assert caplog.records == []
+
+
+def test_a_handle_returns_to_its_model_after_a_drag_without_effect(setup: Setup) -> None:
+    """Clients show the last pose of the drag, which the server has not published."""
+    setup.send("a", Event.PRESS, time=0.0)
+    setup.handles._tick(DRAG_TIMEOUT)
+    assert setup.world.paused
+    assert setup.server.moved == ["a"]
+    setup.send("a", Event.RELEASE, frame="odom")
+    setup.handles._tick(1.0)
+    assert setup.server.moved == ["a", "a"]
+    setup.send("b", Event.PRESS, time=1.0)
+    setup.handles._tick(5.0)
+    assert setup.server.moved == ["a", "a", "b"]
+    setup.send("b", Event.RELEASE, frame="odom")
+    setup.handles._tick(6.0)
+    assert setup.server.moved == ["a", "a", "b", "b"]
+
+
+def test_the_name_of_a_deleted_model_is_used_again(setup: Setup) -> None:
+    setup.server.connected = False
+    path = setup.world.model("a").path
+    setup.world.delete_model("a")
+    applied = setup.server.applied
+    setup.world.spawn_model(path, "a", pose=(0.0, 5.0, 0.0))
+    assert setup.server.inserted == ["a", "b", "a"]
+    assert setup.server.applied == applied + 1
+
+
+def test_an_internal_error_is_logged(
+    setup: Setup, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("cause")
+
+    monkeypatch.setattr(setup.world, "delete_model", fail)
+    setup.send("a", Event.MENU, entry=DELETE_ENTRY)
+    [record] = caplog.records
+    assert record.levelname == "ERROR"
+    assert "unexpected internal error in the feedback" in record.getMessage()
+    assert record.exc_info is not None
+
+
+def test_poses_are_published_30_times_per_second_until_the_end(setup: Setup) -> None:
+    ticker = setup.handles._ticker
+    assert ticker.period == 1.0 / 30.0
+    assert ticker.tick == setup.handles._tick
+    setup.handles.close()
+    assert ticker.closed
 
 
 def test_a_drag_ticks_until_it_ends_also_without_clients(setup: Setup) -> None:
@@ -221,24 +278,33 @@ def test_a_drag_ticks_until_it_ends_also_without_clients(setup: Setup) -> None:
     assert setup.handles._tick(1.3) is False
 
 
+@pytest.mark.parametrize("start", [(0.0, 0.0, 0.0), (1.0, 2.0, 3.0)])
 @pytest.mark.parametrize(
-    ("pose", "moved"),
+    ("by", "moved"),
     [
-        ((0.0, 0.0, 0.1), True),
+        ((0.0, 0.0, 0.00015), True),
         ((0.0, 0.0, -0.1), True),
-        ((0.1, 0.0, 0.0), True),
-        ((0.0, -0.1, 0.0), True),
+        ((0.00015, 0.0, 0.0), True),
+        ((0.0, -0.00015, 0.0), True),
         ((0.0, 0.0, 2.0 * math.pi), False),
-        ((1e-7, -1e-7, 1e-7), False),
+        ((9e-5, -9e-5, 9e-5), False),
     ],
 )
 def test_a_changed_pose_is_published(
-    setup: Setup, pose: tuple[float, float, float], moved: bool
+    setup: Setup,
+    start: tuple[float, float, float],
+    by: tuple[float, float, float],
+    moved: bool,
 ) -> None:
-    setup.world.move_model("a", pose)
+    setup.world.move_model("a", start)
     setup.handles._tick(1.0)
+    setup.server.moved.clear()
+    applied = setup.server.applied
+    x, y, theta = (a + b for a, b in zip(start, by, strict=True))
+    setup.world.move_model("a", (x, y, theta))
+    setup.handles._tick(2.0)
     assert setup.server.moved == (["a"] if moved else [])
-    assert setup.server.applied == 1
+    assert setup.server.applied == applied + 1
 
 
 def test_changes_are_applied_at_once_without_clients(setup: Setup) -> None:

@@ -453,11 +453,15 @@ def test_messages_that_nobody_takes_are_limited(setup: Setup, keeps_all: bool, k
 
 def test_the_transforms_of_the_own_world_are_known_from_the_start(setup: Setup) -> None:
     """A paused world sends none."""
-    setup.simulation.world.transforms = {"odom": Transform(0, "map", "odom", 3.0, 0.0, math.pi)}
+    setup.simulation.world.transforms = {
+        "odom": Transform(0, "map", "odom", 1.0, -2.0, math.pi / 2)
+    }
     setup.graph.published = {"/plan": "nav_msgs/Path"}
     setup.update(drawn="/plan")
     setup.receive("/plan", path(1.0, 2.0, frame="odom"))
-    assert xs(setup.update(drawn="/plan").drawings["/plan"]) == [1.0, 2.0]
+    drawing = setup.update(drawn="/plan").drawings["/plan"]
+    assert isinstance(drawing, Marks)
+    np.testing.assert_allclose(drawing.lines[:, :4], [[1, -1, 1, 0]], atol=1e-6)
     # The transforms end with their subscription.
     setup.simulation.world.transforms = {}
     setup.topics.suspend()
