@@ -2,35 +2,25 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 from pathlib import Path
 
 import pytest
+from compiler import compile_program
 from programs import run_program
-from waiting import BUILD_TIMEOUT
 
 CORE = Path(__file__).parents[2] / "src/cpp"
+STANDARD = ["-std=c++17", f"-I{CORE}"]
 POOL_TEST = Path(__file__).with_name("thread_pool_test.cpp")
 POOL_TESTS = re.findall(r'\{"(\w+)", test_\w+\}', POOL_TEST.read_text())
-
-
-def compiled(program: Path, *arguments: str | Path) -> Path:
-    """Compiles a program and returns its path."""
-    compiler = shutil.which(os.environ.get("CXX", "c++"))
-    assert compiler is not None, "the build of flatland requires a C++ compiler"
-    command = [compiler, "-std=c++17", f"-I{CORE}", *arguments, "-o", program]
-    run_program(command, check=True, silence=BUILD_TIMEOUT)
-    return program
 
 
 @pytest.fixture(scope="module")
 def pool_program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The tests of the thread pool."""
     program = tmp_path_factory.mktemp("thread_pool") / "thread_pool_test"
-    flags = ["-O1", "-Wall", "-Wextra", "-Werror", "-pthread"]
-    return compiled(program, *flags, POOL_TEST, CORE / "parallel/thread_pool.cpp")
+    flags = [*STANDARD, "-O1", "-Wall", "-Wextra", "-Werror", "-pthread"]
+    return compile_program(program, [POOL_TEST, CORE / "parallel/thread_pool.cpp"], flags)
 
 
 def test_there_are_tests_of_the_thread_pool() -> None:
@@ -44,6 +34,7 @@ def test_thread_pool(pool_program: Path, name: str) -> None:
 
 def test_random_numbers_of_the_core(tmp_path: Path) -> None:
     """Known answers of the generator, and the accuracy of normal numbers."""
-    flags = ["-O2", "-ffp-contract=off", "-Wno-psabi"]
+    flags = [*STANDARD, "-O2", "-ffp-contract=off", "-Wno-psabi"]
     source = Path(__file__).with_name("random_kernel_test.cpp")
-    run_program([compiled(tmp_path / "random_kernel_test", *flags, source)], check=True)
+    program = compile_program(tmp_path / "random_kernel_test", [source], flags)
+    run_program([program], check=True)

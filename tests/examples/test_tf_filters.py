@@ -5,6 +5,7 @@ The filter is that of tf2 itself, in a C++ program: amcl, SLAM nodes and costmap
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 from collections.abc import Callable
@@ -12,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from programs import output_of, run_program
-from waiting import BUILD_TIMEOUT
+from compiler import compile_program
+from programs import output_of
 
 DURATION = 4.0  # simulated time [s]
 # Update rates [Hz].
@@ -31,11 +32,11 @@ RESULT = re.compile(r"received (\d+) passed (\d+) dropped (\d+) largest gap ([\d
 def build(folder: Path) -> Path:
     """Compiles the program that counts scans."""
     source = Path(__file__).parent / "tf_filter" / "tf_filter.cpp"
-    program = folder / "tf_filter"
-    flags = run_program(["pkg-config", "--cflags", "--libs", *PACKAGES], check=True).stdout
-    command = ["g++", "-std=c++17", "-w", str(source), "-o", str(program), *shlex.split(flags)]
-    run_program(command, check=True, silence=BUILD_TIMEOUT)
-    return program
+    flags, libraries = (
+        shlex.split(output_of(["pkg-config", option, *PACKAGES], os.environ, folder))
+        for option in ("--cflags", "--libs")
+    )
+    return compile_program(folder / "tf_filter", [source], ["-std=c++17", "-w", *flags], libraries)
 
 
 @pytest.mark.ros

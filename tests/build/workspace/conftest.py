@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from compiler import caching
 from programs import output_of
 from waiting import BUILD_TIMEOUT
 
@@ -51,7 +52,7 @@ def catkin_workspace(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -
     # For a short build: messages for C++ and Python only, and no optimization. The installation by
     # pip tests the default.
     languages = {"ROS_LANG_DISABLE": "geneus:genlisp:gennodejs"}
-    environment = clean_environment(workspace) | languages
+    environment = caching(clean_environment(workspace) | languages, workspace)
     fast = ["-DCMAKE_BUILD_TYPE=RelWithDebInfo", "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O0"]
     output_of(["catkin_make", "-j2", *fast], environment, workspace, silence=BUILD_TIMEOUT)
     output_of(["catkin_make", "install", "-j2"], environment, workspace, silence=BUILD_TIMEOUT)

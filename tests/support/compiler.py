@@ -1,0 +1,63 @@
+"""C++ programs of the tests, compiled with a cache of what earlier runs have compiled.
+
+A compilation with the same input takes its result from build/ccache. ccache hashes the preprocessed
+source, the options and the compiler, and serves concurrent runs. Without ccache, nothing is reused.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from programs import run_program
+from waiting import BUILD_TIMEOUT
+
+_CACHE: Final = Path(__file__).resolve().parents[2] / "build" / "ccache"
+_COMPILERS: Final = "/usr/lib/ccache"  # of Debian: programs of the names of the compilers
+
+
+def caching(environment: Mapping[str, str], base: Path) -> dict[str, str]:
+    """Returns an environment whose compilers use the cache.
+
+    Args:
+        environment: Variables, with `PATH`.
+        base: Folder that has another name in each run; paths below it are relative in the cache.
+    """
+    return {
+        **environment,
+        "PATH": f"{_COMPILERS}:{environment['PATH']}",
+        "CCACHE_DIR": str(_CACHE),
+        "CCACHE_BASEDIR": str(base),
+        "CCACHE_NOHASHDIR": "1",
+        "CCACHE_MAXSIZE": "500M",
+    }
+
+
+def compile_program(
+    program: Path, sources: Sequence[Path], flags: Sequence[str], libraries: Sequence[str] = ()
+) -> Path:
+    """Compiles and links a program.
+
+    Args:
+        program: The program. Object files are placed beside it.
+        sources: Source files.
+        flags: Options of the compiler.
+        libraries: Options of the linker.
+
+    Returns:
+        The program.
+    """
+    environment = caching(os.environ, program.parent)
+    compiler = shutil.which(os.environ.get("CXX", "c++"), path=environment["PATH"])
+    assert compiler is not None, "the build of flatland requires a C++ compiler"
+    objects = []
+    for source in sources:
+        objects.append(program.with_name(f"{source.stem}.o"))
+        command = [compiler, *flags, "-c", source, "-o", objects[-1]]
+        run_program(command, check=True, silence=BUILD_TIMEOUT, env=environment)
+    link = [compiler, *flags, *objects, *libraries, "-o", program]
+    run_program(link, check=True, silence=BUILD_TIMEOUT)
+    return program
