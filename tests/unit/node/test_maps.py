@@ -14,6 +14,7 @@ from waiting import wait_until
 from flatland.errors import FlatlandError
 from flatland.maps.map_image import image_edges
 from flatland.maps.occupancy_grid import OccupancyGrid
+from flatland.node.maps import PublishedLayer
 from flatland.node.parameters import ParameterError
 from flatland.node.transport import CallError
 
@@ -192,3 +193,47 @@ def test_a_large_map_is_replaced(start: Any) -> None:
     assert answer.success
     assert node.call("step_world", duration=0.0).success
     assert static_map(node).grid.cells.shape == (2000, 2000)
+
+
+def test_a_map_is_latched_and_published_once(start: Any) -> None:
+    options: list[Any] = []
+    node = start(RASTER)
+    values = node.transport.values
+
+    def advertise(*arguments: Any, **given: Any) -> Any:
+        options.append((arguments[0], given["latch"], given["on_connection"] is not None))
+        return values(*arguments, **given)
+
+    node.transport.values = advertise
+    served = PublishedLayer(node.transport, node.world, "2d", "map", 1.0)
+    assert options == [("map", True, True), ("map_metadata", True, True)]
+    topic = node.transport.topics["map"]
+    served._on_connection(False)
+    assert not served._requested
+    topic.connect()
+    wait_until("the map", lambda: shapes(node, "map") == [(3, 5)])
+    started: list[int] = []
+    served._start_publishing = lambda: started.append(1)  # type: ignore[method-assign]
+    served._on_connection(True)
+    assert started == []
+
+
+@pytest.mark.parametrize(
+    ("error", "has_traceback"), [(FlatlandError("cause"), False), (RuntimeError("cause"), True)]
+)
+def test_a_map_that_cannot_be_published_is_reported(
+    start: Any, caplog: pytest.LogCaptureFixture, error: Exception, has_traceback: bool
+) -> None:
+    node = start(RASTER)
+    served = PublishedLayer(node.transport, node.world, "2d", "map", 1.0)
+
+    def fail() -> Any:
+        raise error
+
+    served._load = fail  # type: ignore[method-assign]
+    served._requested = True
+    served._publish()
+    assert not served._requested  # The next subscriber causes another attempt.
+    [record] = [each for each in caplog.records if each.levelname == "ERROR"]
+    assert record.getMessage() == "cannot publish the map: cause"
+    assert bool(record.exc_info) is has_traceback

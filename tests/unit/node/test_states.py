@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import threading
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from waiting import wait_until
+from waiting import TIMEOUT, wait_until
+
+from flatland.errors import WorldError
+from flatland.node.states import PAUSED_RATE, PauseTopic, stamped_states
 
 WORLD = """
 properties: {}
@@ -56,3 +61,63 @@ def test_the_states_of_models_are_published_at_a_rate_and_at_changes(node: Any) 
     topic.connected = True
     node.served.simulation.request_steps(8).result(10)
     assert len(topic.sent) == count
+
+
+def test_the_states_of_some_models_are_in_the_order_of_their_names(files: Any) -> None:
+    files.write("ball.model.yaml", BALL)
+    world = files.load(WORLD)
+    for number, name in enumerate("bcd", 1):
+        world.spawn_model("ball.model.yaml", name, f"n{name}", (number, 5.0, 0.5))
+        world.model(name).bodies[0].set_velocity(0.5, 0.0, float(number))
+    world.step()
+    states = stamped_states(world, ["d", "b"])
+    assert (states.stamp, states.frame_id) == (5_000_000, "map")
+    assert list(states.names) == ["d", "b"]
+    assert list(states.namespaces) == ["nd", "nb"]
+    everything = stamped_states(world)
+    assert list(everything.names) == ["a", "b", "c", "d"]
+    assert states.poses.tolist() == everything.poses[[3, 1]].tolist()
+    assert states.velocities.tolist() == everything.velocities[[3, 1]].tolist()
+    assert states.velocities[:, 2].tolist() == pytest.approx([3.0, 1.0], rel=0.1)
+    assert states.poses.shape == states.velocities.shape == (2, 3)
+    with pytest.raises(WorldError, match='model with name "e" does not exist'):
+        stamped_states(world, ["e"])
+
+
+def test_the_pause_state_is_sent_once_for_each_change(files: Any, transport: Any) -> None:
+    world = files.load("{properties: {}, layers: [{name: 2d}]}")
+    posted: list[Any] = []
+    simulation: Any = SimpleNamespace(world=world, post=posted.append)
+    states = PauseTopic(transport, simulation)
+    topic = transport.topics["~paused"]
+    assert states._ticker.period == 1.0 / PAUSED_RATE
+    assert not states._tick(0.0)  # without subscribers
+    topic.connected = True
+    assert topic._post == posted.append
+    for _ in range(2):
+        assert states._tick(0.0)
+    assert topic.sent == []
+    world.pause()
+    for _ in range(2):
+        states._tick(0.0)
+    assert topic.sent == [True]
+    # A new subscriber receives a change that the others have not yet received.
+    world.resume()
+    assert topic._make() is False
+    states._tick(0.0)
+    assert topic.sent == [True, False]
+    assert topic._make() is False
+    states._tick(0.0)
+    assert topic.sent == [True, False]
+    states.close()
+    assert states._ticker.closed
+
+
+def test_a_subscriber_wakes_the_pause_state(files: Any, transport: Any) -> None:
+    posted = threading.Event()
+    world = files.load("{properties: {}, layers: [{name: 2d}]}")
+    simulation: Any = SimpleNamespace(world=world, post=lambda _action: posted.set())
+    states = PauseTopic(transport, simulation)
+    transport.topics["~paused"]._on_connection(True)
+    assert posted.wait(TIMEOUT)
+    states.close()

@@ -344,6 +344,21 @@ def test_a_stop_ends_the_search_for_the_master(
 # -- functions -------------------------------------------------------------------------------------
 
 
+def test_the_help_names_the_program_and_its_options(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        node.main(["--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert text.startswith("usage: flatland_server ")
+    assert "The simulator node of flatland. Parameters are set as _NAME:=VALUE." in text
+    assert "package of the message and service types, if ~msgs_package is not set" in text
+
+
+def test_the_default_of_the_package_is_that_of_the_command_line(setup: Setup) -> None:
+    setup.node = ServerNode("flatland_msgs")
+    assert setup.node.run() == 1
+    assert ("package", "flatland_msgs") in setup.calls
+
+
 def test_the_program_selects_the_package_of_messages(monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[Any] = []
 

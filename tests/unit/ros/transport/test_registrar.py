@@ -201,6 +201,8 @@ def test_an_endpoint_gives_way_to_one_that_does_not(registrar: Registrar) -> Non
     registrar.submit(lambda: done.append("open"))
     assert registrar.flush(TIMEOUT)
     assert done == ["end 0", "end 1", "open"]
+    with pytest.raises(FlatlandError, match="has the type a/Grid already, used by plugin"):
+        registrar.claim("subscriber", TOPIC, Scan, Endpoint())
     for viewer in viewers:
         registrar.release("subscriber", TOPIC, viewer)
     with pytest.raises(FlatlandError, match="has the type a/Grid already, used by plugin"):
