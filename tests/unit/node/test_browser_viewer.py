@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import re
 import socket
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -11,6 +13,8 @@ from free_ports import free_port
 from waiting import wait_until
 from web_client import WebClient
 
+from flatland import web
+from flatland.errors import FlatlandError
 from flatland.node import browser_viewer
 
 
@@ -68,6 +72,133 @@ def test_a_port_that_becomes_free_is_used(
     serve(web=True, web_port=port)
     assert url_of_the_page(caplog) == f"http://127.0.0.1:{port}/"
     assert len(tries) == 2
+
+
+class Viewer:
+    """A server that records its calls."""
+
+    url, view_url = "url", None
+
+    def __init__(self, calls: list[Any], *arguments: Any, **options: Any) -> None:
+        self._calls = calls
+        calls.append(("create", arguments, options))
+
+    def add_world(self, *arguments: Any, **options: Any) -> None:
+        self._calls.append(("world", arguments, options))
+
+    def start(self) -> None:
+        self._calls.append("start")
+
+    def close(self) -> None:
+        self._calls.append("close")
+
+
+@pytest.fixture
+def wired(monkeypatch: pytest.MonkeyPatch, transport: Any) -> tuple[Any, Any, list[Any]]:
+    """A viewer that the test starts, its simulation, and the calls of its server."""
+    calls: list[Any] = []
+    monkeypatch.setattr(web, "WebViewer", lambda *args, **options: Viewer(calls, *args, **options))
+    posted: list[Any] = []
+    simulation: Any = SimpleNamespace(world="world", post=posted.append, posted=posted)
+    parameters: Any = SimpleNamespace(
+        web_host="host", web_port=7, web_token="t", web_view_token="v", web_read_only=True
+    )
+    operations: Any = "operations"
+    viewer = browser_viewer.BrowserViewer(transport, simulation, operations, parameters)
+    return viewer, simulation, calls
+
+
+def test_the_server_is_created_from_the_parameters(
+    wired: Any, transport: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    viewer, simulation, calls = wired
+    [outer] = simulation.posted
+    outer()
+    thread = simulation.posted[1].__self__
+    assert (thread.name, thread.daemon) == ("flatland-web-start", True)
+    viewer._start()
+    options = {"token": "t", "view_token": "v", "read_only": True}
+    topics = transport.foreign_topics
+    added = {"simulation": simulation, "controller": "operations", "foreign_topics": topics}
+    assert calls == [("create", ("host", 7), options), ("world", ("world",), added), "start"]
+    assert [record.getMessage() for record in caplog.records] == ["viewer in the browser: url"]
+    for _ in range(2):
+        viewer.close()
+    assert calls[3:] == ["close"]
+    assert topics.closed
+
+
+def test_a_server_that_starts_during_the_end_is_closed(wired: Any, transport: Any) -> None:
+    viewer, _, calls = wired
+    viewer.close()
+    viewer._start()
+    assert calls[2:] == ["start", "close"]
+    assert transport.foreign_topics.closed
+
+
+@pytest.mark.parametrize("closing", [False, True])
+def test_an_error_of_the_start_is_reported_unless_the_node_ends(
+    wired: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    closing: bool,
+) -> None:
+    viewer, _, calls = wired
+
+    def fail(_viewer: Any) -> None:
+        calls.append("start")
+        raise ValueError("invalid host")
+
+    monkeypatch.setattr(Viewer, "start", fail)
+    if closing:
+        viewer.close()
+    viewer._start()
+    assert calls[2:] == ["start", "close"]
+    text = (
+        "the viewer in the browser cannot start: invalid host. The simulator continues without it"
+    )
+    assert [record.getMessage() for record in caplog.records] == ([] if closing else [text])
+
+
+def test_an_internal_error_of_the_start_is_logged(
+    wired: Any, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(_viewer: Any) -> None:
+        raise RuntimeError("cause")
+
+    monkeypatch.setattr(Viewer, "start", fail)
+    wired[0]._start()
+    [record] = caplog.records
+    assert record.getMessage() == "unexpected internal error of the viewer in the browser"
+    assert record.exc_info is not None
+
+
+@pytest.mark.parametrize(
+    ("cause", "tries"), [(OSError(errno.EADDRINUSE, ""), 51), (OSError(errno.EACCES, ""), 1)]
+)
+def test_a_port_in_use_is_tried_for_ten_seconds(
+    wired: Any, monkeypatch: pytest.MonkeyPatch, cause: OSError, tries: int
+) -> None:
+    viewer, _, calls = wired
+    now = [100.0]
+    monkeypatch.setattr(browser_viewer, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    waits: list[float] = []
+
+    def wait(seconds: float) -> bool:
+        waits.append(seconds)
+        now[0] += 0.2001
+        return False
+
+    monkeypatch.setattr(viewer._closing, "wait", wait)
+
+    def fail(_viewer: Any) -> None:
+        calls.append("start")
+        raise FlatlandError("no port") from cause
+
+    monkeypatch.setattr(Viewer, "start", fail)
+    viewer._start()
+    assert calls.count("start") == tries
+    assert waits == [0.2] * (tries - 1)
 
 
 def test_access_from_other_machines_requires_a_token(
