@@ -119,3 +119,68 @@ def test_a_model_that_returns_has_topics_of_its_own(files: Any, transport: Any) 
     world.step(2)
     assert len(after.sent) == 2
     assert before.sent == []
+
+
+def test_messages_between_two_steps_are_published_at_once(files: Any, transport: Any) -> None:
+    bridge = Bridge(transport, SimulatedClock(transport))
+    published: list[str] = []
+    bridge._send(published.append, "without a world")
+    with pytest.raises(RuntimeError, match="the bridge is not attached to a world"):
+        bridge._post(lambda: None)
+    plugin: Any = None
+    with pytest.raises(RuntimeError, match="the bridge is not attached to a world"):
+        bridge.plugin_ros(plugin)
+    world = files.load_model(ROBOT, observers=[bridge])
+    bridge.step_started()
+    bridge._send(published.append, "in a step")
+    assert published == ["without a world"]
+    bridge.step_finished()
+    assert published == ["without a world", "in a step"]
+    bridge._send(published.append, "after it")
+    assert published[2:] == ["after it"]
+    bridge.step_finished()
+    assert published[3:] == []
+    # What a plugin is given.
+    (plugin, *_) = world.model("robot").plugins
+    access = bridge.plugin_ros(plugin)
+    assert access._plugin is plugin
+    assert access._transport is transport
+    assert access._requests is world.requests
+    assert access._post == bridge._post
+    assert not access._shutting_down()
+    bridge.close()
+    assert access._shutting_down()
+
+
+def test_the_subscription_of_a_command_ends_with_its_model(
+    files: Any, transport: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    subscribers: list[Any] = []
+    subscribe = transport.subscribe
+
+    def record(*arguments: Any, **options: Any) -> Any:
+        subscribers.append(subscribe(*arguments, **options))
+        return subscribers[-1]
+
+    monkeypatch.setattr(transport, "subscribe", record)
+    for ends in (True, False):
+        bridge = Bridge(transport, SimulatedClock(transport))
+        world = files.load_model(ROBOT, observers=[bridge])
+        if not ends:
+            bridge.close()
+        world.delete_model("robot")
+        assert [each.closed for each in subscribers] == [ends]
+        subscribers.clear()
+
+
+def test_a_failing_topic_is_named_with_its_adapter(files: Any, transport: Any) -> None:
+    bridge = Bridge(transport, SimulatedClock(transport))
+    world = files.load_model(ROBOT, observers=[bridge])
+    topic = bridge._outputs[world.output("/scan")]
+
+    def convert(value: Any) -> Any:
+        return value
+
+    topic._convert = convert
+    name = f"{__name__}.{convert.__qualname__}"
+    assert repr(topic) == f'ROS topic "scan" (adapter {name})'
