@@ -1,0 +1,58 @@
+"""The log of flatland, which rospy publishes."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rospy", reason="ROS is not installed")
+
+import rospy
+from rospy.impl.paramserver import get_param_server_cache
+
+from flatland.ros import logs
+
+
+@pytest.fixture
+def logger() -> Iterator[logging.Logger]:
+    """The logger of flatland, as it is before it is forwarded."""
+    logger = logging.getLogger("flatland")
+    before = logger.propagate, logger.handlers, logger.level
+    logger.setLevel(logging.NOTSET)
+    yield logger
+    logger.propagate, logger.handlers = before[:2]
+    logger.setLevel(before[2])
+
+
+@pytest.mark.parametrize("level", [logging.NOTSET, logging.ERROR])
+def test_the_log_is_forwarded_once_at_the_level_of_rospy(
+    logger: logging.Logger, monkeypatch: pytest.MonkeyPatch, level: int
+) -> None:
+    name = "/rosout_disable_topics_generation"
+    asked: list[tuple[str, Any]] = []
+
+    def get_param(*arguments: Any) -> str:
+        asked.append(arguments)
+        return "value"
+
+    monkeypatch.setattr(rospy, "get_param", get_param)
+    logger.setLevel(level)
+    for _ in range(2):
+        logs.log_to_ros()
+    assert asked == [(name, False)] * 2
+    assert get_param_server_cache().get(name) == "value"
+    assert not logger.propagate
+    assert len(logger.handlers) == 1
+    assert logger.level == (level or logging.DEBUG)
+    records: list[logging.LogRecord] = []
+    rosout = logging.getLogger("rosout")
+    monkeypatch.setattr(rosout, "handle", records.append)
+    monkeypatch.setattr(rosout, "isEnabledFor", lambda number: number >= logging.WARNING)
+    for number in (logging.DEBUG, logging.INFO, logging.WARNING, logging.ERROR):
+        logger.log(number, "text")
+    expected = [logging.ERROR] if level else [logging.WARNING, logging.ERROR]
+    assert [record.levelno for record in records] == expected
+    assert records[0].filename == "test_logs.py"
