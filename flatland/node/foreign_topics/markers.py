@@ -112,7 +112,6 @@ class MarkerDrawer:
                 errors[str(error)] += sum(each.frame == frame for each in self._shown.values())
                 last_error = error
         if self._shown and not matrices:
-            self._matrices = {}
             raise last_error
         self.note = "; ".join(
             f"{count} {'marker' if count == 1 else 'markers'} not shown: {reason}"

@@ -122,6 +122,11 @@ def test_a_world_that_is_already_loaded_is_recorded_from_then_on(file: File, loa
     world.step(2)
     assert file.of("/scan") == [(2 * STEP_NS, 0)]
     assert file.of("/tf")
+    output = world.output("/scan")
+    recorder.output_closed(output)
+    recorder.output_closed(output)
+    world.step(2)
+    assert file.of("/scan") == [(2 * STEP_NS, 0)]
     world.delete_model("r")
     world.step(2)
     assert file.of("/scan") == [(2 * STEP_NS, 0)]

@@ -321,6 +321,14 @@ class TestMarkers:
         assert len(marks.lines) + len(marks.triangles) == 50_000
         assert len(marks.line_colors) + len(marks.triangle_colors) == 50_000
 
+    def test_a_marker_without_a_lifetime_stays(self, frames):
+        drawer = MarkerDrawer()
+        drawer.receive(marker(Marker.CUBE), 0)
+        for now in (0, SECOND, 10**6 * SECOND):
+            drawing = drawer.draw(frames, now, again=True)
+            assert isinstance(drawing, Marks)
+            assert area(drawing.triangles) == pytest.approx(1)
+
     def test_add_modify_delete_and_delete_all(self, frames):
         drawer = MarkerDrawer()
 

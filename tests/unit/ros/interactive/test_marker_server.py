@@ -10,10 +10,13 @@ from typing import Any
 import pytest
 from visualization_msgs.msg import (
     InteractiveMarker,
+    InteractiveMarkerFeedback,
     InteractiveMarkerInit,
     InteractiveMarkerUpdate,
 )
 
+from flatland.node.handles import Event, Feedback
+from flatland.node.values import ReceivedPose
 from flatland.ros.interactive import marker_server
 from flatland.ros.interactive.marker_server import (
     CONNECTING_TIME,
@@ -180,3 +183,33 @@ def test_new_and_erased_markers_are_always_part_of_a_full_state(setup: Setup) ->
     assert len(setup.apply()) == 2
     setup.server.erase("c")
     assert len(setup.apply()) == 2
+
+
+def test_feedback_is_passed_on_between_two_steps(
+    setup: Setup, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    actions: list[Any] = []
+    received: list[Any] = []
+    handles: Any = SimpleNamespace(receive=received.append)
+    monkeypatch.setattr(setup.server, "_post", actions.append)
+    monkeypatch.setattr(setup.server, "_handles", handles)
+    message = InteractiveMarkerFeedback(
+        marker_name="a",
+        client_id="/rviz",
+        event_type=InteractiveMarkerFeedback.POSE_UPDATE,
+        menu_entry_id=3,
+    )
+    message.header.frame_id = "/map"
+    message.pose.position.x = 2.0
+    message.pose.orientation.w = 1.0
+    setup.now = 123.0
+    setup.server._receive_feedback(message)
+    assert received == []
+    actions.pop()()
+    pose = ReceivedPose("map", (2.0, 0.0, 0.0))
+    assert received == [Feedback("a", "/rviz", Event.MOVE, 3, pose, 123.0)]
+    message.event_type = 200
+    message.pose.orientation.w = 0.0
+    setup.server._receive_feedback(message)
+    actions.pop()()
+    assert received[1] == Feedback("a", "/rviz", Event.OTHER, 3, ReceivedPose("map", None), 123.0)
