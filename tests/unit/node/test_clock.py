@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from waiting import TIMEOUT, wait_until
 
-from flatland.node.clock import SimulatedClock, WallClock, stamp
+from flatland.node.clock import NodeClock, SimulatedClock, WallClock, stamp
 
 START = 1_700_000_000_000_000_000  # ns
 STEP = 5_000_000  # ns
@@ -94,6 +94,34 @@ def test_other_times_are_stamped_relative_to_the_last_ones(wall: Wall) -> None:
     assert stamp(wall.time - STEP - 7) == before - 7
 
 
+@pytest.mark.parametrize(("back", "is_set_back"), [(100 * MS, False), (100 * MS + 1, True)])
+def test_a_clock_is_corrected_by_the_largest_age_at_most(
+    wall: Wall, back: int, is_set_back: bool
+) -> None:
+    wall.step(until_advance=0, rest=0)
+    next_stamp = stamp(wall.time) + 1
+    wall.now = next_stamp - back
+    wall.time += STEP
+    wall.clock.time_advanced(wall.time)
+    assert stamp(wall.time) == (wall.now if is_set_back else next_stamp)
+
+
+def test_the_stamp_of_a_step_is_renewed_after_the_largest_age(wall: Wall) -> None:
+    wall.now += 100 * MS
+    wall.clock.step_started(0)
+    assert stamp(0) == START
+    wall.now += 1
+    wall.clock.step_started(0)
+    assert stamp(0) == wall.now
+    assert wall.clock.watches_steps is True
+    assert wall.clock.watches_time is False
+
+
+def test_a_clock_without_a_topic_needs_no_steps() -> None:
+    clock = NodeClock()
+    assert (clock.watches_steps, clock.watches_time) == (False, False)
+
+
 # -- simulated time ---------------------------------------------------------------------------
 
 
@@ -165,3 +193,20 @@ def test_with_a_limited_rate_a_time_is_published_once(transport: Any) -> None:
     for thread in threads:
         thread.join(TIMEOUT)
         assert not thread.is_alive()
+
+
+def test_an_error_of_the_topic_is_logged_and_reported(
+    transport: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    clock = SimulatedClock(transport)
+
+    def fail() -> None:
+        raise RuntimeError("cause")
+
+    done = clock._run_now(fail)
+    assert str(done.exception(0)) == "cause"
+    [record] = caplog.records
+    assert record.getMessage() == "cannot publish the time"
+    assert record.exc_info is not None
+    assert clock._run_now(lambda: 5).result(0) == 5
+    clock.close()
