@@ -161,6 +161,9 @@ def test_bodies_fall_asleep_and_wake_up(world: PhysicsWorld) -> None:
     assert not body.awake
     body.apply_force((1, 0), (1, 0))
     assert body.awake
+    body.awake = False
+    body.apply_torque(1)
+    assert body.awake
     body.set_velocity(1, 0, 0)
     body.awake = False
     assert body.velocity == (0, 0, 0)
@@ -187,6 +190,16 @@ def test_a_moved_static_body_wakes_the_bodies_at_its_new_pose(world: PhysicsWorl
     box.set_pose(8.6, 0, 0)
     run(world, 200)
     assert sleeper.pose[0] > 10.05
+
+
+def test_a_moved_static_body_wakes_the_bodies_at_each_of_its_fixtures(world: PhysicsWorld) -> None:
+    sleepers = [disc(world, x) for x in (10, 14)]
+    pillars = world.create_body("static", (-20, 0, 0))
+    for x in (0, 4):
+        pillars.create_circle((x, 0), 0.4, density=0)
+    run(world, 100)
+    pillars.set_pose(10, 0, 0)
+    assert [body.awake for body in sleepers] == [True, True]
 
 
 def test_destroying_a_static_body_wakes_the_bodies_in_contact_with_it(world: PhysicsWorld) -> None:

@@ -212,6 +212,15 @@ def test_forces_may_make_a_body_faster() -> None:
     assert body.velocity == pytest.approx((5.0, 0, 2.5), rel=1e-5)
 
 
+def test_a_torque_may_turn_a_wide_body() -> None:
+    world = PhysicsWorld()
+    body = world.create_body("dynamic", (0, 0, 0))
+    body.create_circle((0, 0), 3, density=10)
+    body.apply_torque(body.inertia * 50)
+    assert world.step(*STEP) is None
+    assert body.velocity == pytest.approx((0, 0, 0.25), rel=1e-5)
+
+
 def test_spring_of_a_weld_joint_may_make_bodies_faster() -> None:
     world = PhysicsWorld()
     first = world.create_body("dynamic", (0, 0, 0))

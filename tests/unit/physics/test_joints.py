@@ -48,6 +48,14 @@ def test_a_revolute_joint_holds_the_anchors_together(world: PhysicsWorld) -> Non
     assert theta > 0.5
 
 
+def test_a_new_joint_wakes_both_bodies(world: PhysicsWorld) -> None:
+    bodies = box(world), box(world, 3)
+    for body in bodies:
+        body.awake = False
+    world.create_revolute_joint(*bodies, (1.5, 0), (-1.5, 0))
+    assert [body.awake for body in bodies] == [True, True]
+
+
 def test_limits_restrict_the_angle(world: PhysicsWorld) -> None:
     post, door = box(world, 0, "static"), box(world, 1)
     joint = world.create_revolute_joint(post, door, (0.5, 0), (-0.5, 0), limits=(-0.25, 0.5))

@@ -1,0 +1,82 @@
+"""The jobs of a step, after jobs were added and removed, and permissions to step without code."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from flatland.physics import AgentBatch, PhysicsBody, PhysicsWorld, RangeFinder, Run
+from flatland.plugin_api.update_timer import UpdateTimer
+
+STEP = 10_000_000  # ns
+# In each step, and in no step but that at time 0.
+ALWAYS, NEVER = (UpdateTimer(rate).clock(STEP) for rate in (math.inf, 1e-9))
+
+
+def run(world: PhysicsWorld) -> list[int]:
+    """Returns the callbacks that are to be called first."""
+    return world.jobs.run(*Run(STEP, STEP, 1, 0.01, 8, 3))[2]
+
+
+def mover(world: PhysicsWorld) -> PhysicsBody:
+    body = world.create_body("kinematic", (0, 0, 0))
+    body.control_velocity().set_target(1.0, 0.0, 0.0)
+    return body
+
+
+def add_controller(world: PhysicsWorld) -> Callable[[], None]:
+    return world.create_body("kinematic", (0, 0, 0)).control_velocity().remove
+
+
+def add_callback(world: PhysicsWorld) -> Callable[[], None]:
+    callback = world.jobs.add_callback((1, 0), NEVER, is_after=True)
+    return lambda: world.jobs.remove_callback(callback)
+
+
+def add_crowd(world: PhysicsWorld) -> Callable[[], None]:
+    return world.add_crowd(
+        is_orca=False, is_dynamic=False, bits=1, interval=1, key=1, numbers={}
+    ).remove
+
+
+@pytest.mark.parametrize("add", [add_controller, add_callback, add_crowd])
+def test_a_new_controller_acts_although_another_job_is_removed(
+    add: Callable[[PhysicsWorld], Callable[[], None]],
+) -> None:
+    world = PhysicsWorld()
+    remove = add(world)
+    run(world)
+    body = mover(world)
+    remove()
+    run(world)
+    assert body.velocity == (1.0, 0.0, 0.0)
+
+
+def test_a_new_clock_does_not_replace_one_in_use() -> None:
+    world = PhysicsWorld()
+    first = world.jobs.add_callback((1, 0), ALWAYS, is_after=False)
+    removed = world.jobs.add_callback((2, 0), NEVER, is_after=False)
+    world.jobs.remove_callback(removed)
+    world.jobs.add_callback((3, 0), NEVER, is_after=True)
+    second = world.jobs.add_callback((4, 0), ALWAYS, is_after=False)
+    assert run(world) == [first, second]
+    world.jobs.remove_callback(first)
+    world.jobs.add_callback((5, 0), NEVER, is_after=False)
+    assert run(world) == [second]
+
+
+def test_interrupts_never_amount_to_a_permission() -> None:
+    world = PhysicsWorld()
+    body = world.create_body("dynamic", (0, 0, 0))
+    beams = RangeFinder(np.array([(1.0, 0.0)]), 1.0, origin=(0, 0, 0), mask=1)
+    batch = AgentBatch([(body, body.control_velocity(), world.collect_touches([body]), beams)])
+    for _ in range(3):
+        assert batch.not_permitted(np.array([True])) == [0]
+        world.jobs.interrupt()
+    batch.permit(0)
+    assert batch.not_permitted(np.array([True])) == []
+    world.jobs.interrupt()
+    assert batch.not_permitted(np.array([True])) == [0]
