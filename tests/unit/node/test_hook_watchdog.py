@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 
 import pytest
-from waiting import wait_until
+from waiting import TIMEOUT, wait_until
 
 import flatland
 from flatland.node.hook_watchdog import LIMIT, HookWatchdog
@@ -84,3 +85,13 @@ def test_the_thread_of_the_simulation_is_watched(
     Blocking().hook(lambda: wait_until("the report", lambda: empty_world.requests.blocked_by))
     wait_until("the end", lambda: not empty_world.requests.blocked_by)
     watchdog.close()
+
+
+def test_a_closed_watchdog_ends_its_thread(empty_world: flatland.World) -> None:
+    before = set(threading.enumerate())
+    watchdog = HookWatchdog(empty_world)
+    [thread] = set(threading.enumerate()) - before
+    assert (thread.name, thread.daemon) == ("flatland-hook-watchdog", True)
+    watchdog.close()
+    thread.join(TIMEOUT)
+    assert not thread.is_alive()

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import Future
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from flatland.node.initial_pose import _log_failure
 from flatland.node.values import ReceivedPose
 
 ROBOT = """
@@ -80,3 +82,32 @@ def test_the_odometry_of_a_moved_model_jumps_along_by_default(
     assert node.call("move_model", name="007", pose=away).success
     node.call("step_world", duration=0.0)
     assert odometry.sent[-1].pose == pytest.approx(START if kept else (-3, 3, 1), abs=1e-6)
+
+
+def test_a_pose_kidnaps_the_model_and_an_internal_error_is_logged(
+    node: Any, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    odometry = node.transport.topics["odometry/filtered"]
+    odometry.connect()
+    assert send(node, "map", (-3.0, 3.0, 1.0)) == (-3.0, 3.0, 1.0)
+    node.call("step_world", duration=0.0)
+    assert odometry.sent[-1].pose == pytest.approx(START, abs=1e-6)  # It continues.
+    assert "initialpose" not in caplog.text
+
+    def fail(*_: object, **__: object) -> None:
+        raise RuntimeError("cause")
+
+    monkeypatch.setattr(node.world, "move_model", fail)
+    send(node, "map", START)
+    [record] = [each for each in caplog.records if each.levelname == "ERROR"]
+    assert record.getMessage() == "initialpose: unexpected internal error"
+    assert record.exc_info is not None
+    assert str(record.exc_info[1]) == "cause"
+    cancelled: Future[Any] = Future()
+    cancelled.cancel()
+    done: Future[Any] = Future()
+    done.set_result(None)
+    caplog.clear()
+    for future in (cancelled, done):
+        _log_failure(future)
+    assert caplog.records == []
