@@ -268,6 +268,25 @@ def test_a_copy_with_a_smaller_tree_grows_like_its_original(
     step_all(world, copy)
 
 
+def test_a_reverted_world_without_free_nodes_grows_like_its_original() -> None:
+    rng = random.Random(1)
+    source = PhysicsWorld()
+    for _ in range(8):
+        add_circle(source, rng)
+    world = source.copy()  # with 47 nodes, which 24 circles use
+    for _ in range(16):
+        add_circle(world, rng)
+    copy = world.copy()
+    world.step(*STEP)
+    world.become_copy_of(copy)
+    state = rng.getstate()
+    for each in (world, copy):
+        rng.setstate(state)
+        for _ in range(20):
+            add_circle(each, rng)
+    step_all(world, copy)
+
+
 @PROPERTY
 @given(seed=SEEDS)
 def test_a_cleared_world_is_like_a_new_one(seed: int) -> None:
