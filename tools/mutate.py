@@ -142,6 +142,8 @@ _ROOMS = {
             "tests/ros/test_plugin_ros.py",
             "tests/ros/test_web_topics.py",
             "tests/ros/test_teleop.py",
+            "tests/ros/test_start.py",
+            "tests/ros/test_shutdown.py",
         ),
     ),
     # Without tests that take long; each still serves for the file that it mirrors.

@@ -74,11 +74,11 @@ def test_an_equivalent_change_is_recognized_by_its_difference(mutate: ModuleType
 def test_each_equivalent_change_is_one_of_the_program(mutate: ModuleType, checkout: Path) -> None:
     known = mutate.equivalents((checkout / "tools" / "mutate_equivalent.txt").read_text())
     assert all(known.values()), "each change needs a reason"
-    for key in known:
-        path = Path(key[0])
-        text = (checkout / path).read_text()
-        changes = mutate.mutations(path, text)
-        assert key in {mutate.describe(key[0], text, change).key for change in changes}, path
+    for name in {name for name, *_ in known}:
+        text = (checkout / name).read_text()
+        changes = mutate.mutations(Path(name), text)
+        possible = {mutate.describe(name, text, change).key for change in changes}
+        assert {key for key in known if key[0] == name} <= possible, name
 
 
 def test_tests_mirror_a_file(mutate: ModuleType, checkout: Path) -> None:
