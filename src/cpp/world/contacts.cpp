@@ -101,10 +101,8 @@ void ContactRecorder::PostSolve(b2Contact* contact, const b2ContactImpulse* impu
   if (!is_collected && !is_recorded) return;
   try {
     ContactRow row = make_row(contact, ContactKind::kPostSolve);
-    for (int32 i = 0; i < impulse->count && i < b2_maxManifoldPoints; ++i) {
-      row.normal_impulses[i] = impulse->normalImpulses[i];
-      row.tangent_impulses[i] = impulse->tangentImpulses[i];
-    }
+    std::copy_n(impulse->normalImpulses, impulse->count, row.normal_impulses);
+    std::copy_n(impulse->tangentImpulses, impulse->count, row.tangent_impulses);
     if (is_collected) touches.post_solve(row, step_);
     if (is_recorded) rows_.push_back(row);
   } catch (const std::exception&) {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 from collections.abc import Callable
 
@@ -66,6 +67,34 @@ def test_a_new_clock_does_not_replace_one_in_use() -> None:
     world.jobs.remove_callback(first)
     world.jobs.add_callback((5, 0), NEVER, is_after=False)
     assert run(world) == [second]
+
+
+class _HeapUse(ctypes.Structure):
+    """`struct mallinfo2` of the C library: ten numbers."""
+
+    _fields_ = [(f"number_{i}", ctypes.c_size_t) for i in range(10)]
+
+
+def _heap_use() -> int:
+    """Returns the memory that the C++ code of the process uses [B]."""
+    mallinfo = ctypes.CDLL(None).mallinfo2
+    mallinfo.restype = _HeapUse
+    use = mallinfo()
+    return int(use.number_4 + use.number_7)  # hblkhd and uordblks
+
+
+def test_clocks_of_removed_callbacks_are_reused() -> None:
+    world = PhysicsWorld()
+
+    def use_new_clocks(first: int, count: int) -> None:
+        for weight in range(first, first + count):
+            callback = world.jobs.add_callback((1, 0), (weight, 10**6), is_after=False)
+            world.jobs.remove_callback(callback)
+
+    use_new_clocks(1, 10_000)
+    before = _heap_use()
+    use_new_clocks(10_001, 10_000)
+    assert _heap_use() - before < 50_000  # 5 B for each clock; one that is kept takes 32 B
 
 
 def test_interrupts_never_amount_to_a_permission() -> None:
