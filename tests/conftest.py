@@ -11,11 +11,20 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
+
+# Selenium installs Trio, whose plugin for Hypothesis takes a third of the time of its import.
+os.environ["HYPOTHESIS_NO_PLUGINS"] = "1"
+
 from hypothesis import HealthCheck, settings
+from hypothesis.internal.conjecture import providers
 
 # Each process of pytest-xdist imports all modules of the tests, most of which time it would spend
 # with their compilation. The processes share what each of them has compiled.
 sys.dont_write_bytecode = False
+# Hypothesis would read the source of all imported modules, including packages of Debian, for
+# numbers and texts to try. This takes several seconds in each process after each import of a large
+# package, and the examples would depend on the tests that have run in a process before.
+providers._get_local_constants = lambda: providers._local_constants
 
 # How fast a loaded machine is says nothing about the code. The examples are the same in each run,
 # so that a change that fails has caused it; `--hypothesis-profile=random`, which
@@ -74,6 +83,7 @@ def _group_of(path: str) -> str:
     return next((folder for folder in _GROUPED_FOLDERS if path.startswith(f"{folder}/")), path)
 
 
+@functools.cache
 def _rank(path: str) -> int:
     """Returns the position of a file among the slow paths, beyond them for all others."""
     ranks = (rank for rank, slow in enumerate(_SLOW_PATHS) if f"{path}/".startswith(f"{slow}/"))
@@ -96,7 +106,8 @@ class _Folder(pytest.Dir):
 
 
 def pytest_collect_directory(path: Path, parent: pytest.Collector) -> _Folder:
-    """Returns the collector of a folder."""
+    """Returns the collector of a folder; there is no garbage until all tests are collected."""
+    gc.disable()
     return _Folder.from_parent(parent, path=path)
 
 
@@ -124,6 +135,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def pytest_collection_finish() -> None:
     """Excludes modules and tests from garbage collection, which otherwise visits all of them."""
+    gc.enable()
     gc.collect()
     gc.freeze()
 

@@ -95,12 +95,16 @@ def import_nodes(tree: ast.AST, kind: str) -> Iterator[tuple[ast.Import | ast.Im
         inner = kind
         if isinstance(node, ast.FunctionDef) and kind == "run":
             inner = "late"
-        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+        elif isinstance(node, ast.If) and is_type_checking(node.test):
             inner = "type"
         if isinstance(node, (ast.Import, ast.ImportFrom)):
             yield node, inner
-        elif not isinstance(node, ast.expr):
+        elif isinstance(node, (ast.stmt, ast.excepthandler, ast.match_case)):
             yield from import_nodes(node, inner)
+
+
+def is_type_checking(test: ast.expr) -> bool:
+    return isinstance(test, ast.Name) and test.id == "TYPE_CHECKING"
 
 
 def imported_names(node: ast.Import | ast.ImportFrom) -> list[str]:

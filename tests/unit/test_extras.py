@@ -24,7 +24,6 @@ class Blocker:
 sys.meta_path.insert(0, Blocker())
 """
 CLI = "from flatland.cli import main; sys.exit(main({arguments!r}))"
-WORLD = "import flatland\nwith flatland.World() as world: world.step(); world.{call}"
 
 # The missing module, the program or arguments of `flatland`, the error, and the command.
 ENTRIES: list[tuple[str, str | list[str], str, str]] = [
@@ -37,9 +36,7 @@ ENTRIES: list[tuple[str, str | list[str], str, str]] = [
     ),
     ("matplotlib", ["show", "{world}", "-o", "a.png"], "drawing needs", "python3-matplotlib"),
     ("matplotlib", ["run", "{world}", "--video", "a.mp4"], "drawing", "python3-matplotlib"),
-    ("matplotlib", WORLD.format(call="draw()"), "drawing needs", "python3-matplotlib"),
     ("aiohttp", ["view", "{world}", "--no-browser"], "the viewer needs", "python3-aiohttp"),
-    ("aiohttp", WORLD.format(call="view()"), "the viewer needs", "python3-aiohttp"),
     (
         "aiohttp",
         "from flatland.gym import FlatlandEnv; FlatlandEnv('corridor', render_mode='human')",
@@ -81,7 +78,7 @@ def worlds(checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> P
 # Runs each program in a child of a process that has imported the package, which takes longest.
 PROGRAMS = """
 import json, os, sys
-import flatland.cli
+import flatland.cli, flatland.plugins.diff_drive, flatland.plugins.laser, flatland.simulation
 
 for number, (module, program) in enumerate(json.load(sys.stdin)):
     child = os.fork()

@@ -88,24 +88,6 @@ def test_containers_of_the_standard_library_are_copied(value: Any) -> None:
     assert repr(copy) == repr(value)
 
 
-def test_handles_of_the_extension_find_their_copied_world() -> None:
-    world, other = object(), object()
-
-    class Handle:
-        def __init__(self, owner: object) -> None:
-            self.owner = owner
-
-        def __deepcopy__(self, memo: dict[int, Any]) -> Handle:
-            return Handle(memo[id(self.owner)])
-
-    Handle.__module__ = "flatland._core"
-    copier = Copier({})
-    copier.add(world, other)
-    first, second = copied([handle := Handle(world), handle], copier)
-    assert first is second
-    assert first.owner is other
-
-
 def test_an_object_with_a_hidden_state_is_refused() -> None:
     with pytest.raises(UncopyableError, match="an object of type generator"):
         copied([(number for number in range(3))])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import threading
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -136,14 +135,7 @@ class TestModels:
         assert distances[distances > 0.4].min() > 0.77
         assert (distances > 0.4).sum() > 0.7 * 2 * np.pi * 0.8 * SCALE
 
-    def test_polygon_rotates_with_its_body(self, files):
-        points = "type: polygon, points: [[0, 0], [2, 0], [2, 1], [0, 1]]"
-        pixels = plan(room_world(files, body(footprint=points)))
-        assert not is_like(at(pixels, 3.2, 4.8), FLOOR)
-        assert is_like(at(pixels, 4.2, 4), FLOOR)
-        assert is_like(at(pixels, 3.2, 5.2), FLOOR)
-
-    @pytest.mark.parametrize("heading", [0.0, 2.0, -1.0])
+    @pytest.mark.parametrize("heading", [2.0, -1.0])
     def test_triangle_shows_the_heading(self, files, heading):
         world = room_world(files, body())
         world.move_model("robot", (5, 5, heading))
@@ -314,7 +306,7 @@ class TestImage:
         assert image.flags.c_contiguous
         assert (image == world.draw(names=True)).all()
 
-    @pytest.mark.parametrize("size", [(300, 200), (29, 57), (333, 1001)])
+    @pytest.mark.parametrize("size", [(29, 57), (333, 1001)])
     def test_size_is_exact(self, files, size):
         world = room_world(files)
         assert world.draw(size=size, axes=False).shape == (size[1], size[0], 3)
@@ -351,15 +343,10 @@ class TestImage:
         ("view", "size"),
         [
             ((0, 0, 10, 10), None),
-            ((0, 0, 10, 10), (300, 900)),
             ((100, 200, 100.9, 200.9), (800, 500)),
             ((-101, -201, -100.5, -200.5), (300, 900)),
             ((0, -12_000, 9_000, 9_000), None),
-            ((0, 0, 0.1, 0.1), (800, 500)),
-            ((12_345, 12_345, 12_346, 12_346), (300, 900)),
             ((-1e9, -1e9, 1e9, 1e9), (300, 900)),
-            ((-1e9, -1e9, 1e9, 1e9), (800, 500)),
-            ((0, -1, 50, 1), None),
             ((0, -1, 50, 1), (800, 500)),
         ],
     )
@@ -422,32 +409,25 @@ class TestSave:
         blue_green_red = cv2.imread(str(path))
         assert (blue_green_red[:, :, ::-1] == world.draw(size=(400, 300))).all()
 
-    @pytest.mark.parametrize(("name", "start"), [("a.pdf", b"%PDF"), ("a.svg", b"<?xml")])
-    def test_vector_formats(self, files, tmp_path, name, start):
-        drawing.save(room_world(files, body()), tmp_path / name)
-        assert (tmp_path / name).read_bytes().startswith(start)
+    def test_vector_formats(self, files, tmp_path):
+        drawing.save(room_world(files, body()), tmp_path / "a.svg")
+        assert (tmp_path / "a.svg").read_bytes().startswith(b"<?xml")
 
     def test_unknown_extension_raises(self, empty_world):
         with pytest.raises(ValueError, match=r"must end with one of .png, .pdf, .svg"):
             drawing.save(empty_world, "image.xcf")
 
 
-class TestMatplotlib:
-    def run(self, script: str, folder: Path) -> str:
-        command = [sys.executable, "-W", "error", "-c", script]
-        done = run_program(command, cwd=folder)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
-
-    def test_first_image_imports_matplotlib_without_pyplot(self, tmp_path):
-        printed = self.run(
-            "import sys, flatland\n"
-            "NAMES = ('matplotlib', 'matplotlib.pyplot')\n"
-            "def loaded(): print([name for name in NAMES if name in sys.modules])\n"
-            "loaded()\n"
-            "with flatland.World() as world:\n"
-            "    world.step(); loaded()\n"
-            "    world.draw(); flatland.drawing.save(world, 'a.pdf'); loaded()\n",
-            tmp_path,
-        )
-        assert printed.splitlines() == ["[]", "[]", "['matplotlib']"]
+def test_first_image_imports_matplotlib_without_pyplot(tmp_path):
+    script = (
+        "import sys, flatland\n"
+        "NAMES = ('matplotlib', 'matplotlib.pyplot')\n"
+        "def loaded(): print([name for name in NAMES if name in sys.modules])\n"
+        "with flatland.World() as world:\n"
+        "    world.step(); loaded()\n"
+        "    world.draw(); flatland.drawing.save(world, 'a.pdf'); loaded()\n"
+    )
+    command = [sys.executable, "-W", "error", "-c", script]
+    done = run_program(command, cwd=tmp_path, check=True)
+    assert done.stdout.splitlines() == ["[]", "['matplotlib']"]
+    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")

@@ -250,12 +250,11 @@ class TestPreSolve:
         world.step()
         assert world.model("robot").body("base").velocity[0] == pytest.approx(-2.0, rel=1e-2)
 
-    @pytest.mark.parametrize("speed", [1.5, -1.5])
-    def test_tangent_speed_moves_the_disc_like_a_belt(self, bench: Any, speed: float) -> None:
+    def test_tangent_speed_moves_the_disc_like_a_belt(self, bench: Any) -> None:
         _, without, _ = self.velocity(bench)
-        _, along, _ = self.velocity(bench, tangent_speed=speed)
+        _, along, _ = self.velocity(bench, tangent_speed=1.5)
         assert abs(along - without) > 0.05
-        _, back, _ = self.velocity(bench, tangent_speed=-speed)
+        _, back, _ = self.velocity(bench, tangent_speed=-1.5)
         assert (along - without) * (back - without) < 0
 
 
@@ -269,15 +268,3 @@ def test_pre_solve_is_not_called_without_plugins_that_override_it(bench: Any) ->
     world.delete_model("hand")
     world.step()
     assert world.physics.pre_solve is None
-
-
-def test_contacts_are_not_recorded_without_contact_hooks(bench: Any) -> None:
-    world = bench.load(f"  - {{name: disc, model: disc.yaml}}\n{WALL}")
-    world.step()
-    assert world.physics.record_contacts is False
-    world.spawn_model("Recorder.yaml", "robot", pose=(40, 0, 0))
-    world.step()
-    assert world.physics.record_contacts is True
-    world.delete_model("robot")
-    world.step()
-    assert world.physics.record_contacts is False

@@ -20,7 +20,7 @@ from flatland.runtime.observer import WorldObserver
 from flatland.values import Twist
 
 Make = Callable[..., Any]
-COUNT, STEPS = 3, 60
+COUNT, STEPS = 3, 40
 
 
 class Watcher(WorldObserver):
@@ -146,20 +146,6 @@ def test_a_first_update_is_called_if_it_is_wanted(make: Make, room: Path) -> Non
     assert len(calls) == count
 
 
-def test_a_refused_call_of_the_core_advances_no_world(make: Make, room: Path) -> None:
-    env = make(FlatlandVectorEnv, COUNT, room)
-    env.reset(seed=0)
-    for _ in range(2):
-        env.step(np.zeros((COUNT, 2)))
-    times = [world.time for world in env._stage.worlds]
-    batch = env._episodes._batch
-    batch._sensor_poses = np.zeros((COUNT, 2))  # The core refuses the array, after the locks.
-    with pytest.raises(ValueError, match="sensor_poses"):
-        env.step(np.ones((COUNT, 2)))
-    assert [world.time for world in env._stage.worlds] == times
-    assert not any(world.requests.lock._is_owned() for world in env._stage.worlds)
-
-
 def test_a_command_has_the_last_value_of_the_core(make: Make, room: Path) -> None:
     env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
     env.reset(seed=0)
@@ -273,25 +259,3 @@ def test_an_exception_while_worlds_step_leaves_them_complete(make: Make, room: P
     assert [world.time for world in env.worlds] == pytest.approx([0.1, 0.0, 0.1])
     env.step(actions)
     assert [world.time for world in env.worlds] == pytest.approx([0.2, 0.1, 0.2])
-
-
-def test_the_core_observes_other_agents_while_worlds_step(make: Make, room: Path) -> None:
-    env, commands, ones = begun(make, room)
-    batch, situation = env._episodes._batch, env.episodes.situation
-    acting = np.array([True, False, True])
-    core = batch._core
-    with pytest.raises(ValueError, match="has not begun"):
-        core.observe([1])
-
-    def meanwhile() -> None:
-        situation.poses[1] = situation.ranges[1] = np.nan
-        core.observe([1])
-        assert np.isfinite(situation.ranges[1]).all()
-        assert situation.poses[1].tolist() == list(env.episodes.agents[1].body.pose)
-        with pytest.raises(ValueError, match="steps, or is observed already"):
-            core.observe([0])
-        with pytest.raises(IndexError, match="no such agent"):
-            core.observe([COUNT])
-
-    assert batch.perform(commands, acting, 20, meanwhile).tolist() == []
-    assert batch.perform(commands, ones, 20, lambda: None).tolist() == []

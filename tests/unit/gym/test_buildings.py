@@ -58,44 +58,43 @@ def test_a_vector_equals_single_environments(
     make: Make, mode: AutoresetMode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stage, "_IDLE_PER_WORLD", 0.5)  # Some worlds are closed and made again.
-    vector = make(FlatlandVectorEnv, 4, OFFICES, max_steps=15, autoreset_mode=mode)
+    vector = make(FlatlandVectorEnv, 2, OFFICES, max_steps=6, autoreset_mode=mode)
     single = make(
         SyncVectorEnv,
-        [partial(FlatlandEnv, OFFICES, max_steps=15) for _ in range(4)],
+        [partial(FlatlandEnv, OFFICES, max_steps=6) for _ in range(2)],
         autoreset_mode=mode,
     )
-    assert run(vector, 4, 80) == run(single, 4, 80)
+    assert run(vector, 2, 40) == run(single, 2, 40)
 
 
 def test_results_do_not_depend_on_threads_and_other_environments(make: Make) -> None:
     vectors = [
-        make(FlatlandVectorEnv, 5, OFFICES, max_steps=10, num_threads=threads) for threads in (1, 3)
+        make(FlatlandVectorEnv, 3, OFFICES, max_steps=5, num_threads=threads) for threads in (1, 3)
     ]
-    first, second = (run(envs, 5, 40) for envs in vectors)
+    first, second = (run(envs, 3, 20) for envs in vectors)
     assert first == second
     # An environment beside others has the episodes that it has alone.
-    alone = make(FlatlandVectorEnv, 1, OFFICES, max_steps=10)
-    beside = make(FlatlandVectorEnv, 5, OFFICES, max_steps=10)
+    alone, beside = make(FlatlandVectorEnv, 1, OFFICES, max_steps=5), vectors[0]
     alone.reset(seed=9)
     beside.reset(seed=9)
-    for action in actions(5, 40):
+    for action in actions(3, 20):
         one, many = alone.step(action[:1]), beside.step(action)
         assert one[0].tobytes() == many[0][:1].tobytes()
         assert name_of(alone.worlds[0]) == name_of(beside.worlds[0])
 
 
 def test_each_episode_draws_its_building(make: Make) -> None:
-    envs = make(FlatlandVectorEnv, 6, OFFICES, max_steps=5, autoreset_mode="SameStep")
+    envs = make(FlatlandVectorEnv, 3, OFFICES, max_steps=3, autoreset_mode="SameStep")
     envs.reset(seed=0)
-    seen: list[set[str]] = [set() for _ in range(6)]
-    for action in actions(6, 80):
+    seen: list[set[str]] = [set() for _ in range(3)]
+    for action in actions(3, 50):
         for row, world in enumerate(envs.worlds):
             seen[row].add(name_of(world))
             pose = world.model("robot").pose
             assert pose == pytest.approx(tuple(envs.poses[row]), abs=1e-9)
-        assert len(set(map(id, envs.worlds))) == 6
+        assert len(set(map(id, envs.worlds))) == 3
         envs.step(action)
-    assert seen == [{"office_0", "office_1", "office_2"}] * 6
+    assert seen == [{"office_0", "office_1", "office_2"}] * 3
 
 
 def test_starts_and_goals_are_in_the_building(make: Make) -> None:
@@ -129,7 +128,7 @@ def test_buildings_are_files_or_included_worlds(make: Make, tmp_path: Path) -> N
 
 
 def test_people_begin_each_episode_at_other_places(make: Make) -> None:
-    envs = make(make_vec, "flatland/Crowd-v0", 4, autoreset_mode="SameStep")
+    envs = make(make_vec, "flatland/Crowd-v0", 2, autoreset_mode="SameStep")
 
     def people() -> list[tuple[float, ...]]:
         names = [f"person_{number}" for number in range(20)]
@@ -142,10 +141,10 @@ def test_people_begin_each_episode_at_other_places(make: Make) -> None:
     for seed in (0, 100, 0):
         envs.reset(seed=seed)
         starts |= set(people())
-        for _ in range(20):
-            envs.step(np.array([[-1.0, 0.0]] * 4))
+        for _ in range(10):
+            envs.step(np.array([[-1.0, 0.0]] * 2))
         ends |= set(people())
-    assert len(starts) == len(ends) == 8  # The last episodes repeat the first ones.
+    assert len(starts) == len(ends) == 4  # The last episodes repeat the first ones.
 
 
 def test_episodes_among_people_equal_those_of_single_environments(

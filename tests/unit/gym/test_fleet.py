@@ -29,21 +29,21 @@ def run(env: Any, seed: int, steps: int) -> list[Any]:
     return numbers
 
 
-@pytest.mark.parametrize("num_robots", [1, 4, 12])
+@pytest.mark.parametrize("num_robots", [1, 4])
 def test_the_checker_of_pettingzoo_finds_nothing(make: Make, num_robots: int) -> None:
-    parallel_api_test(make(make_parallel, num_robots=num_robots), 300)
+    parallel_api_test(make(make_parallel, num_robots=num_robots), 100)
 
 
 def test_an_episode_depends_on_the_seed_and_the_actions_only(make: Make) -> None:
-    expected = [run(make(make_parallel, num_robots=5), seed, 60) for seed in range(3)]
-    env = make(make_parallel, num_robots=5)
-    for seed in (2, 0, 1, 1, 0):
-        assert run(env, seed, 60) == expected[seed]
+    expected = [run(make(make_parallel, num_robots=3), seed, 30) for seed in range(3)]
+    env = make(make_parallel, num_robots=3)
+    for seed in (2, 0, 1, 1):
+        assert run(env, seed, 30) == expected[seed]
 
 
 def test_robots_and_goals_keep_a_distance(make: Make) -> None:
     env = make(make_parallel, num_robots=16)
-    for seed in range(20):
+    for seed in range(5):
         env.reset(seed=seed)
         states = env.state().reshape(16, 8)
         for places in (states[:, :2], states[:, 6:]):

@@ -16,8 +16,8 @@ Make = Callable[..., Any]
 
 
 def test_the_included_policy_reaches_goals(make: Make) -> None:
-    envs = make(FlatlandVectorEnv, 32, autoreset_mode="SameStep")
-    outcomes = evaluate(Policy(env=envs), envs, 64, seed=1_000_000)
+    envs = make(FlatlandVectorEnv, 8, autoreset_mode="SameStep")
+    outcomes = evaluate(Policy(env=envs), envs, 24, seed=1_000_000)
     assert outcomes.success_rate >= 0.95
     assert outcomes.collision_rate <= 0.02
 
@@ -30,7 +30,7 @@ def test_actions_do_not_depend_on_other_environments(make: Make) -> None:
     envs = make(FlatlandVectorEnv, 4)
     policy, singles = Policy(env=envs), [Policy() for _ in range(4)]
     observations, _ = envs.reset(seed=1)
-    for _ in range(20):
+    for _ in range(5):
         actions = policy(observations)
         assert actions.shape == (4, 2)
         assert actions.dtype == np.float32
@@ -49,7 +49,7 @@ def test_equal_episodes_have_equal_actions(make: Make) -> None:
         policy.reset()
         observation, _ = env.reset(seed=3)
         actions = []
-        for _ in range(30):
+        for _ in range(10):
             actions.append(policy(observation))
             observation, _, terminated, _, _ = env.step(actions[-1])
             if terminated:

@@ -13,7 +13,6 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
-from gymnasium.vector import AsyncVectorEnv
 from programs import run_program
 
 from flatland.gym import FlatlandEnv, FlatlandVectorEnv, make_parallel
@@ -77,11 +76,3 @@ def test_an_environment_survives_a_new_process(make: Make, tmp_path: Path) -> No
     )
     done = run_program([sys.executable, "-c", program, str(file)], check=True)
     assert bytes.fromhex(done.stdout) == env.reset(seed=3)[0].tobytes()
-
-
-def test_a_vector_of_spawned_processes_has_the_same_episodes(make: Make) -> None:
-    vector = make(
-        AsyncVectorEnv, [lambda: FlatlandEnv("corridor")] * 2, context="spawn", shared_memory=False
-    )
-    same = make(FlatlandVectorEnv, 2, "corridor")
-    assert episode(vector, 3) == episode(same, 3)

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NoReturn
 
 import pytest
 
-from flatland.gym import FlatlandEnv, FlatlandVectorEnv, live_view, stage
-from flatland.gym.fleet import FleetEnv
+from flatland.gym import FlatlandVectorEnv, live_view, stage
 from flatland.world import World
-
-CREATE: list[Callable[..., Any]] = [FlatlandEnv, lambda **options: FlatlandVectorEnv(3, **options)]
-CREATE.append(lambda **options: FleetEnv(2, **options))
 
 
 class BrokenError(Exception):
@@ -37,14 +32,13 @@ def worlds(monkeypatch: pytest.MonkeyPatch) -> list[World]:
     return created
 
 
-@pytest.mark.parametrize("create", CREATE, ids=["single", "vector", "fleet"])
 @pytest.mark.parametrize("part", ["EpisodeView", "Episodes"])
 def test_a_failed_environment_leaves_no_world(
-    create: Callable[..., Any], part: str, worlds: list[World], monkeypatch: pytest.MonkeyPatch
+    part: str, worlds: list[World], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stage, part, fail)
     with pytest.raises(BrokenError):
-        create()
+        FlatlandVectorEnv(3)
     assert worlds
     assert all(world.closed for world in worlds)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Callable
 from functools import partial
@@ -50,7 +49,7 @@ def draws(make: Make, n: int, world: Path, task: RandomGoal) -> np.ndarray:
 
 def test_places_are_reachable_free_and_clear(make: Make, rooms: Path) -> None:
     task = RandomGoal(distance=(0.5, 4.0), clearance=0.2, margin=None)
-    drawn = draws(make, 300, rooms, task)
+    drawn = draws(make, 100, rooms, task)
     for x, y in (drawn[:, 0:2].T, drawn[:, 3:5].T):
         assert x.min() >= 3 + 0.4 - 1e-3  # never in the room without a door
         assert x.max() <= 9 - 0.4 + 1e-3
@@ -62,7 +61,7 @@ def test_places_are_reachable_free_and_clear(make: Make, rooms: Path) -> None:
     distance = np.hypot(*(drawn[:, 3:5] - drawn[:, 0:2]).T)
     assert distance.min() >= 0.5
     assert distance.max() <= 4.0
-    assert len(np.unique(drawn[:, 2])) == 300
+    assert len(np.unique(drawn[:, 2])) == 100
 
 
 def test_a_margin_excludes_detours(make: Make, rooms: Path) -> None:
@@ -70,8 +69,8 @@ def test_a_margin_excludes_detours(make: Make, rooms: Path) -> None:
         """Where the wall with the far door is between start and goal."""
         return ((drawn[:, 0] < 6) != (drawn[:, 3] < 6)) & (drawn[:, 1] < 3) & (drawn[:, 4] < 3)
 
-    assert crosses(draws(make, 200, rooms, RandomGoal(distance=(0.5, 4), margin=None))).any()
-    assert not crosses(draws(make, 200, rooms, RandomGoal(distance=(0.5, 4), margin=0.5))).any()
+    assert crosses(draws(make, 100, rooms, RandomGoal(distance=(0.5, 4), margin=None))).any()
+    assert not crosses(draws(make, 100, rooms, RandomGoal(distance=(0.5, 4), margin=0.5))).any()
 
 
 def test_models_are_not_overlapped(make: Make, room: Path) -> None:
@@ -79,7 +78,7 @@ def test_models_are_not_overlapped(make: Make, room: Path) -> None:
         "bodies: [{name: box, footprints: [{type: circle, radius: 1.2, density: 5}]}]\n"
     )
     room.write_text(room.read_text() + "  - {name: box, model: box.model.yaml, pose: [4, 2, 0]}\n")
-    drawn = draws(make, 100, room, RandomGoal(distance=(0.5, 4.0), clearance=0.1))
+    drawn = draws(make, 50, room, RandomGoal(distance=(0.5, 4.0), clearance=0.1))
     for places in (drawn[:, 0:2], drawn[:, 3:5]):
         assert np.hypot(*(places - (4, 2)).T).min() >= 1.2 + 0.2 + 0.1 - 0.01
 
@@ -221,13 +220,6 @@ def test_a_fleet_takes_a_new_task(make: Make) -> None:
     env.task = FAR
     infos = env.reset(seed=0)[1]
     assert all(info["distance"] >= 4.0 for info in infos.values())
-
-
-def test_a_copy_has_the_new_task(make: Make) -> None:
-    env = make(world="corridor", task=NEAR)
-    env.task = FAR
-    other = make(lambda: copy.deepcopy(env))
-    assert other.reset(seed=0)[1]["distance"] >= 4.0
 
 
 def test_an_impossible_task_is_an_error_and_the_previous_one_remains(make: Make) -> None:

@@ -39,10 +39,10 @@ def test_40_hz_at_5_ms_fires_every_fifth_step_for_hours(hours: int) -> None:
     assert fired_steps(40.0, 0.005, 1000, start) == list(range(start, start + 1000, 5))
 
 
-@pytest.mark.parametrize("rate", [0.1, 0.37, 1.1, 3.0, 7.0, 30.0, 33.3, 60.0, 100.0, 199.0, 200.0])
-@pytest.mark.parametrize("step_size", [0.001, 0.002, 0.0033, 0.005])
+@pytest.mark.parametrize("rate", [0.37, 7.0, 33.3, 199.0, 200.0])
+@pytest.mark.parametrize("step_size", [0.001, 0.0033, 0.005])
 def test_updates_are_exactly_rate_times_time(rate: float, step_size: float) -> None:
-    steps = 30_000
+    steps = 10_000
     for start in (0, 720_000):
         due = Fraction(str(rate)) * Fraction(str(step_size)) * steps
         assert abs(len(fired_steps(rate, step_size, steps, start)) - min(due, steps)) < 2
@@ -51,8 +51,8 @@ def test_updates_are_exactly_rate_times_time(rate: float, step_size: float) -> N
 @pytest.mark.parametrize("rate", [7.0, 30.0, 60.0])
 def test_updates_agree_with_the_formula_of_the_reference(rate: float) -> None:
     dt = 0.005
-    expected = [k for k in range(3000) if math.fmod(k * dt + dt / 2, 1 / rate) < dt]
-    assert fired_steps(rate, dt, 3000) == expected
+    expected = [k for k in range(1000) if math.fmod(k * dt + dt / 2, 1 / rate) < dt]
+    assert fired_steps(rate, dt, 1000) == expected
 
 
 def test_rate_above_the_step_rate_fires_in_every_step() -> None:

@@ -208,10 +208,3 @@ class TestScans:
         scan, before = described_laser(world).scan, ranges.copy()
         out[:] = 0
         assert (scan.ranges == before).all()
-
-
-def test_closed_world_raises(files):
-    world = room_world(files)
-    world.close()
-    with pytest.raises(flatland.WorldError, match="the world is closed"):
-        describe_world(world, None, scans=True)

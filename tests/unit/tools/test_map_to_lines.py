@@ -67,14 +67,6 @@ def test_output_files_and_messages(image_map: Path, out: Path, capsys: Any) -> N
     assert captured.err == ""
 
 
-def test_origin_of_coordinates_is_the_lower_left_corner(image_map: Path, out: Path) -> None:
-    assert main([str(image_map), str(out)]) == 0
-    segments = read_line_segments(str(out / "map_lines.dat"))
-    xs, ys = segments[:, ::2], segments[:, 1::2]
-    assert (xs.min(), xs.max()) == pytest.approx((30, 110), abs=1)
-    assert (ys.min(), ys.max()) == pytest.approx((10, 70), abs=1)
-
-
 @pytest.mark.parametrize("detail", ["low", "med", "high"])
 def test_segments_match_the_exact_boundary_within_a_pixel(
     image_map: Path, out: Path, detail: str
@@ -164,18 +156,10 @@ def test_existing_image_is_no_conflict_without_image_option(image_map: Path, out
     assert (out / "map_lines.png").read_text() == "existing"
 
 
-@pytest.mark.parametrize("key", ["image", "resolution", "origin", "occupied_thresh"])
-def test_missing_key(image_map: Path, out: Path, key: str, capsys: Any) -> None:
-    lines = image_map.read_text().splitlines()
-    image_map.write_text("\n".join(line for line in lines if not line.startswith(key)))
-    assert main([str(image_map), str(out)]) == 1
-    assert f'Entry "{key}" does not exist' in capsys.readouterr().err
-    assert names(out) == set()
-
-
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
+        ("resolution", "resolutions", 'Entry "resolution" does not exist'),
         ("room.png", "rooms.png", "rooms.png"),
         ("room.png", "room.yaml", 'Failed to load "'),
         ("0.05", "0", 'Invalid "resolution", must be greater than 0'),

@@ -76,9 +76,15 @@ def test_each_equivalent_change_is_one_of_the_program(mutate: ModuleType, checko
     assert all(known.values()), "each change needs a reason"
     for name in {name for name, *_ in known}:
         text = (checkout / name).read_text()
-        changes = mutate.mutations(Path(name), text)
-        possible = {mutate.describe(name, text, change).key for change in changes}
-        assert {key for key in known if key[0] == name} <= possible, name
+        listed = {key for key in known if key[0] == name}
+        lines = [f"- {line.strip()}" for line in text.splitlines()]
+        # To describe a change takes long.
+        changes = [
+            change
+            for change in mutate.mutations(Path(name), text)
+            if any(lines[text.count("\n", 0, change.start)] in lost for _, _, lost in listed)
+        ]
+        assert listed <= {mutate.describe(name, text, each).key for each in changes}, name
 
 
 def test_tests_mirror_a_file(mutate: ModuleType, checkout: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from flatland.physics import boundary_edges
 from flatland.tools.wall_segments import WallBoundary, find_wall_segments
 
-SCALES = [1.05, 1.5, 2.0]
+SCALES = [1.05, 2.0]
 
 
 def edges_of(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
@@ -71,7 +71,7 @@ def test_segments_are_within_a_pixel_of_the_walls(scale: float) -> None:
 
 def test_noisy_walls() -> None:
     rng = np.random.default_rng(3)
-    mask = sample_mask()
+    mask = sample_mask()[:100, :150]
     # Every tenth pixel at a wall is flipped.
     walls = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((3, 3))) > 0
     mask ^= walls & (rng.random(mask.shape) < 0.1)
@@ -117,13 +117,6 @@ def test_uniform_image_has_no_segments(value: bool) -> None:
     found = find_wall_segments(np.full((1, 1), value), 1.5)
     assert found.shape[1] == 4
     assert len(find_wall_segments(np.ones((50, 50), bool), 1.5)) == 0
-
-
-def test_larger_image_scale_yields_more_segments() -> None:
-    mask = sample_mask()
-    counts = [len(find_wall_segments(mask, scale)) for scale in SCALES]
-    assert counts == sorted(counts)
-    assert counts[0] < counts[-1]
 
 
 def test_offsets_agree_with_a_search_over_all_edges() -> None:

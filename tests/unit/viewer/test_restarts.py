@@ -81,10 +81,9 @@ def start(programs: list[Program], folder: Path, body: str) -> Program:
     return programs[-1]
 
 
-@pytest.mark.parametrize("code", [0, 1, 3])
-def test_the_exit_code_is_that_of_the_function(programs, tmp_path, code):
-    program = start(programs, tmp_path, f"return {code}")
-    assert program.end() == (code, "")
+def test_the_exit_code_is_that_of_the_function(programs, tmp_path):
+    program = start(programs, tmp_path, "return 3")
+    assert program.end() == (3, "")
     assert len(program.children()) == 1
 
 

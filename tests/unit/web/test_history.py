@@ -47,9 +47,13 @@ def times(kept: History) -> list[float]:
 
 
 class TestMoments:
-    def test_older_moments_are_kept_at_a_longer_period(self, world: World, clock: Clock) -> None:
+    def test_older_moments_are_kept_at_a_longer_period(
+        self, world: World, clock: Clock, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(history, "RECENT", 6.0)
+        monkeypatch.setattr(history, "MAX_AGE", 60.0)
         kept = History(world, clock)
-        run(kept, world, clock, 400)
+        run(kept, world, clock, 80)
         gaps = np.diff(times(kept))
         recent = round(history.RECENT / history.PERIOD)
         assert set(gaps[-recent + 1 :]) == {history.PERIOD}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import re
@@ -89,16 +90,17 @@ class TestMessages:
         with pytest.raises(messages.MessageError, match=f"^{re.escape(reason)}"):
             messages.parse(text)
 
-    @pytest.mark.parametrize("kind", sorted(messages._FIELDS))
-    def test_a_valid_message_has_its_fields(self, kind):
-        message = messages.parse(json.dumps({"type": kind, "id": 7, "world": 3, **VALID[kind]}))
-        assert (message.type, message.id, message.world) == (kind, 7, 3)
-        assert message.fields.keys() == VALID[kind].keys()
+    def test_a_valid_message_has_its_fields(self):
+        assert VALID.keys() == messages._FIELDS.keys()
+        for kind, fields in VALID.items():
+            message = messages.parse(json.dumps({"type": kind, "id": 7, "world": 3, **fields}))
+            assert (message.type, message.id, message.world) == (kind, 7, 3)
+            assert message.fields.keys() == fields.keys()
 
-    @pytest.mark.parametrize(("kind", "field"), FIELDS)
-    def test_each_field_is_checked(self, kind, field):
-        for wrong in ("{}", "1e999", "[{}]", '"\\u0000"', "[1e999, 1e999, 1e999]", "-1e300"):
-            text = json.dumps({"type": kind, **VALID[kind], field: "?"}).replace('"?"', wrong)
+    def test_each_field_is_checked(self):
+        wrong = ("{}", "1e999", "[{}]", '"\\u0000"', "[1e999, 1e999, 1e999]", "-1e300")
+        for (kind, field), value in itertools.product(FIELDS, wrong):
+            text = json.dumps({"type": kind, **VALID[kind], field: "?"}).replace('"?"', value)
             with pytest.raises(messages.MessageError, match=f"^{kind}: {field} must be "):
                 messages.parse(text)
 

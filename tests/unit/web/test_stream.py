@@ -348,32 +348,6 @@ class TestNobodyLooks:
 
 
 class TestWorlds:
-    def test_an_idle_world_without_a_simulation_is_shown(self, world, viewer):
-        viewer.add_world(world)
-        with RawWebClient(viewer.url) as client:
-            client.wait_model("robot")
-            assert client.wait("status")["rate"] is None
-            world.step(100)
-            client.wait("status", lambda message: message["time"] == 0.5)
-
-    def test_a_program_steps_the_world_in_a_loop(self, world, viewer):
-        viewer.add_world(world)
-        with RawWebClient(viewer.url) as client:
-            client.wait_model("robot")
-            stop = threading.Event()
-
-            def loop() -> None:
-                while not stop.is_set():
-                    world.step()
-
-            thread = threading.Thread(target=loop)
-            thread.start()
-            try:
-                client.wait("status", lambda message: message["time"] > 0.5)
-            finally:
-                stop.set()
-                thread.join()
-
     def test_a_closed_world_is_gone_and_replaced_by_the_next_one(self, files, world, viewer):
         viewer.add_world(world, "first")
         with RawWebClient(viewer.url) as client:

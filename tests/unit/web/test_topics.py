@@ -154,14 +154,14 @@ def test_marks_and_grids_are_sent_when_they_have_changed(url, source):
             assert struct.unpack_from("<f", client.wait(MARKS).payload, 16) == (5,)
 
 
-def test_values_are_sent_to_those_who_inspect_a_topic(url, source):
+def test_values_are_sent_to_those_who_inspect_a_topic(url, source, world):
     with RawWebClient(url) as client, RawWebClient(url) as other:
         other.ask("look", topics=[])
         client.ask("look", topics=[], topic_values=["/odom"])
         source.set_values({"x": 1.5})
         message = client.wait("topic_values")
         assert (message["topic"], message["value"]) == ("/odom", {"x": 1.5})
-        assert message["time"] > 0
+        assert 0 <= message["time"] <= world.time
         source.topics = [ODOM]
         assert [m for m in other.receive_until("topics") if m_type(m) == "topic_values"] == []
         last = source.demands[-1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import math
 import sys
 from pathlib import Path
@@ -19,7 +20,7 @@ from flatland import worldgen
 from flatland.worldgen.raster import Rect
 from flatland.worldgen.room import Room
 
-SEEDS = 30
+SEEDS = 10
 # In metres; the last one has several corridors.
 SIZES = ((14.0, 11.0), (12.0, 14.0), (16.0, 10.0), (30.0, 23.0))
 KINDS = worldgen.KINDS
@@ -29,7 +30,7 @@ Mask = npt.NDArray[np.bool_]
 
 
 def size_of(seed: int) -> tuple[float, float]:
-    return SIZES[3] if seed % 20 == 0 else SIZES[seed % 3]
+    return SIZES[3] if seed == 0 else SIZES[seed % 3]
 
 
 def regions(mask: Mask) -> int:
@@ -48,7 +49,7 @@ def places(grid: Any, radius: float) -> Mask:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_disc_reaches_all_free_places_in_thirty_worlds(kind: str) -> None:
+def test_a_disc_reaches_all_free_places_in_ten_worlds(kind: str) -> None:
     for seed in range(SEEDS):
         world = worldgen.generate(kind, seed, size_of(seed))
         assert regions(world.grid.cells == 0) == 1, seed
@@ -62,7 +63,7 @@ def test_a_disc_reaches_all_free_places_in_thirty_worlds(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("radius", "resolution"), [(0.15, 0.03), (0.45, 0.1), (0.4, 0.05)])
 def test_other_radii_and_resolutions(kind: str, radius: float, resolution: float) -> None:
-    for seed in range(2):
+    for seed in range(1):
         world = worldgen.generate(kind, seed, (18.0, 23.0), resolution=resolution, radius=radius)
         fits = places(world.grid, radius)
         assert regions(fits) == 1, seed
@@ -124,13 +125,11 @@ def digest(world: worldgen.RandomWorld) -> str:
 
 def test_the_same_seed_gives_the_same_files_in_another_process() -> None:
     program = (
-        "import sys; sys.path[:0] = sys.argv[1:]\n"
-        "import test_random_worlds as t\n"
-        "for kind in t.KINDS: print(t.digest(t.worldgen.generate(kind, 7, t.SMALL)))"
+        "import hashlib\nfrom flatland import worldgen\n"
+        f"{inspect.getsource(digest)}\n"
+        f"for kind in worldgen.KINDS: print(digest(worldgen.generate(kind, 7, {SMALL})))"
     )
-    support = Path(__file__).resolve().parents[2] / "support"
-    done = run_program([sys.executable, "-c", program, str(Path(__file__).parent), str(support)])
-    assert done.returncode == 0, done.stderr
+    done = run_program([sys.executable, "-c", program], check=True)
     digests = [digest(worldgen.generate(kind, 7, SMALL)) for kind in KINDS]
     assert done.stdout.split() == digests
     assert digest(worldgen.generate("maze", 8, SMALL)) not in digests
