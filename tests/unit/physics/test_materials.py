@@ -338,6 +338,15 @@ def test_labels_equal_those_of_single_rays(seed: int) -> None:
         assert scan.hits[label - 1] == (hit.fixture.body.id, hit.fixture.category_bits)
 
 
+def test_of_coincident_walls_the_one_in_the_mask_is_labelled() -> None:
+    world, sensor = room()
+    walls = {bits: add_edge(world, [3, -8, 3, 8], None, bits) for bits in (2, 4)}
+    for bits, wall in walls.items():
+        scan = finder(FRONT, mask=bits).scan_labels(sensor, 1, 1)
+        assert (scan.labels == 1).all()
+        assert scan.hits == [(wall.id, bits)]
+
+
 def test_readings_that_are_no_hits_have_no_label() -> None:
     _, sensor = room()
     noise = RangeNoise.beam(
