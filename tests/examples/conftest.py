@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+import forked_ros
 import pytest
 from free_ports import free_port
 from programs import Program
@@ -53,6 +54,32 @@ def environment(
 ) -> dict[str, str]:
     """The environment of a shell after `. setup.bash`."""
     return new_environment(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def ros_programs(
+    new_environment: Callable[[Path], dict[str, str]], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Path]:
+    """A folder of programs of ROS that start faster than those that are installed."""
+    pytest.importorskip("rosservice", reason="ROS is not installed")
+    folder = tmp_path_factory.mktemp("ros")
+    socket = folder / "socket"
+    server = Program(
+        [sys.executable, forked_ros.__file__, socket], env=new_environment(folder), cwd=folder
+    )
+    server.wait_for_line("ready")
+    programs = folder / "bin"
+    programs.mkdir()
+    forked_ros.write_programs(programs, socket)
+    yield programs
+    server.stop()
+
+
+@pytest.fixture
+def ros_environment(environment: dict[str, str], ros_programs: Path) -> dict[str, str]:
+    """The environment of a shell after `. setup.bash`, with these programs."""
+    environment["PATH"] = f"{ros_programs}:{environment['PATH']}"
+    return environment
 
 
 @pytest.fixture

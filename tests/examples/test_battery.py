@@ -67,14 +67,6 @@ def test_battery_publishes_at_its_rate(load):
     assert readings[0].capacity == 100
 
 
-def test_battery_topics_are_in_the_namespace_of_the_model(load, tmp_path):
-    world = load(robot=robot("capacity: 1"))
-    world.spawn_model("robot.yaml", "other", "r2")
-    assert sorted(world.ports.outputs) == ["/battery", "/r2/battery"]
-    world.delete_model("other")
-    assert sorted(world.ports.outputs) == ["/battery"]
-
-
 @pytest.mark.parametrize(
     ("parameters", "text"),
     [

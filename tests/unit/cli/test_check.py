@@ -348,14 +348,6 @@ class TestAllProblems:
         for part in ('"range" does not exist', '"increment" to float', '{"foo"}'):
             assert any(part in message for message in messages)
 
-    def test_a_model_with_an_invalid_namespace_is_checked(self, files, capsys):
-        files.write("m.model.yaml", "bodies: [{name: base, footprints: [], x: 1}]")
-        models = "[{name: m, model: m.model.yaml, namespace: 1}]"
-        path = files.write("w.yaml", f"{{properties: {{}}, layers: [], models: {models}}}")
-        first, second = self.report(path, capsys)["problems"]
-        assert "not a legal ROS name" in first["message"]
-        assert '{"x"}' in second["message"]
-
     def test_errors_of_one_file_are_not_repeated_for_each_model(self, files, capsys):
         files.write("m.model.yaml", "bodies: [{name: base, footprints: [], x: 1}]")
         models = ", ".join(f"{{name: m{i}, model: m.model.yaml}}" for i in range(5))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from flatland_command import main
+from forked_workers import CONTEXT
 from pages import pattern_of, read_page
 from programs import run_program
 
@@ -30,6 +31,7 @@ def run_block(text: str, capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_the_commands_of_the_page_print_what_it_says(checkout, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("flatland.scenarios.workers._CONTEXT", CONTEXT)
     (tmp_path / "worlds").mkdir()
     (tmp_path / "worlds" / "office").symlink_to(checkout / "worlds" / "office")
     output, compared = "", 0

@@ -80,15 +80,14 @@ def test_a_plugin_is_a_ros_package_with_a_manifest(monkeypatch, capsys) -> None:
     assert main("check", "speedy/worlds/demo.yaml") == 0, capsys.readouterr().out
 
 
-@pytest.mark.parametrize("kind", ["office", "maze", "warehouse"])
-def test_random_world(folder: Path, capsys: Any, kind: str) -> None:
+def test_random_world(folder: Path, capsys: Any) -> None:
     arguments = ("--size", "15x14", "--resolution", "0.1", "--radius", "0.2")
-    assert main("new", "world", "lab", f"--{kind}", "--seed", "3", *arguments) == 0
+    assert main("new", "world", "lab", "--office", "--seed", "3", *arguments) == 0
     printed = capsys.readouterr().out
     assert printed.startswith("created lab, seed 3\n")
     assert "flatland run lab/world.yaml" in printed
     assert main("check", "lab/world.yaml") == 0, capsys.readouterr().out
-    generated = worldgen.generate(kind, 3, (15, 14), resolution=0.1, radius=0.2)
+    generated = worldgen.generate("office", 3, (15, 14), resolution=0.1, radius=0.2)
     for name, data in generated.files("lab").items():
         assert (folder / "lab" / name).read_bytes() == data
     assert [path.name for path in folder.iterdir()] == ["lab"]

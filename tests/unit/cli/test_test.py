@@ -11,6 +11,7 @@ import sys
 
 import pytest
 from flatland_command import main
+from forked_workers import CONTEXT
 from waiting import TIMEOUT, wait_until
 
 WORLD = """
@@ -50,15 +51,15 @@ def suite(files, monkeypatch):
         "s.yaml",
         """
         world: room.world.yaml
-        goal: [6, 5]
+        goal: [4.5, 5]
         seeds: 0:3
         limits: {time: 15}
         require: [reached within 12 s]
         """,
     )
     monkeypatch.chdir(files.folder)
-    # One worker process by default, since most of the time is that of their start.
     monkeypatch.setattr("os.cpu_count", lambda: 1)
+    monkeypatch.setattr("flatland.scenarios.workers._CONTEXT", CONTEXT)
     return files.folder
 
 
@@ -82,7 +83,7 @@ def test_a_suite_is_run_and_reported(suite, capsys):
 def test_a_failed_run_is_drawn_and_can_be_replayed(suite, capsys):
     options = ("--robot", "straight", "--param", "x=1", "--out", "out", "--junit", "j.xml")
     text = (suite / "s.yaml").read_text()
-    (suite / "s.yaml").write_text(text.replace("[6, 5]", "[20, 5]"))
+    (suite / "s.yaml").write_text(text.replace("[4.5, 5]", "[20, 5]"))
     assert main("test", "s.yaml", "--seeds", "4", *options) == 1
     output = capsys.readouterr().out
     assert "worst run: s straight seed 4" in output

@@ -8,6 +8,7 @@ from textwrap import dedent
 from typing import Any
 
 import pytest
+from forked_workers import CONTEXT
 
 from flatland.scenarios.episode import Options, Result, run_scenario
 from flatland.scenarios.reader import read_scenarios
@@ -45,6 +46,12 @@ properties: {}
 layers: [{name: walls, map: room.yaml}]
 models: [{name: robot, model: robot.model.yaml, pose: [2, 5, 0]}]
 """
+
+
+@pytest.fixture
+def forked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Makes worker processes start faster."""
+    monkeypatch.setattr("flatland.scenarios.workers._CONTEXT", CONTEXT)
 
 
 @pytest.fixture

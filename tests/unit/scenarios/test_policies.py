@@ -58,14 +58,9 @@ def test_an_action_that_is_not_finite_is_an_error(run):
     assert "not finite" in row["error"]
 
 
-def test_the_included_policy_drives_to_the_goals(run):
-    row = run("goals: [[5, 5], [3, 7]]", "policy").row
-    assert row["outcome"] == "reached", row["error"]
-
-
-def test_a_policy_in_a_file_drives_to_the_goals(run, room):
+def test_the_included_policy_and_one_in_a_file_drive_to_the_goals(run, room):
     shutil.copy(INCLUDED, room / "other.onnx")
-    row, included = (run("goal: [5, 5]", name).row for name in ("other.onnx", "policy"))
+    row, included = (run("goals: [[5, 5], [3, 7]]", name).row for name in ("other.onnx", "policy"))
     assert row["outcome"] == "reached", row["error"]
     assert row["path_length"] == included["path_length"]
 

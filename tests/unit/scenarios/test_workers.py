@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 
@@ -60,7 +61,12 @@ class DiesOnce(Drives):
 class Dies(Drives):
     def command(self, scan, pose, goal):
         os._exit(3)
+
+class Faults(Drives):
+    def command(self, scan, pose, goal):
+        os.kill(os.getpid(), signal.SIGSEGV)
 """
+pytestmark = pytest.mark.usefixtures("forked")
 
 
 @pytest.fixture
@@ -109,7 +115,6 @@ def test_results_do_not_depend_on_the_number_of_processes(suite):
         ("HangsAtStart", WorkerLimits(command_time=0.3), "a call of the controller took more than"),
         ("Hangs", WorkerLimits(run_time=0.5), "the run took more than 0.5 s of wall time"),
         ("Floods", WorkerLimits(memory=200 << 20), "the run needed more memory than its limit"),
-        ("Dies", WorkerLimits(), "ended in each of 3 attempts (exit code 3)"),
     ],
 )
 def test_a_run_that_must_be_ended_is_an_error(name, limits, message, suite, room):
@@ -122,10 +127,14 @@ def test_a_run_that_must_be_ended_is_an_error(name, limits, message, suite, room
         assert (room / "out" / result.recording).is_file()
 
 
-def test_a_run_that_ends_its_process_does_not_affect_others(suite):
-    runs, plan = suite(["Dies", "Drives"])
+def test_a_run_that_ends_its_process_is_an_error_and_does_not_affect_others(suite):
+    runs, plan = suite(["Dies", "Drives", "Faults"])
     results = carry_out(runs, plan)
-    assert [results[run.key].row["passed"] for run in runs] == [False, True]
+    dies, drives, faults = (results[run.key].row for run in runs)
+    assert drives["passed"]
+    assert "ended in each of 3 attempts (exit code 3)" in dies["error"]
+    assert f"(signal {int(signal.SIGSEGV)})" in faults["error"]
+    assert (dies["outcome"], dies["passed"]) == ("error", False)
 
 
 def test_a_run_whose_worker_is_killed_is_made_again(suite, room):
@@ -136,16 +145,14 @@ def test_a_run_whose_worker_is_killed_is_made_again(suite, room):
     assert not results[runs[1].key].row["worker"].endswith(f":{killed}")
 
 
-def test_what_a_controller_prints_is_dropped(suite, capfd):
-    runs, plan = suite(["Prints"])
+@pytest.mark.parametrize("is_shown", [False, True])
+def test_what_a_controller_prints_is_dropped_or_shown(is_shown, suite, capfd, monkeypatch):
+    # The streams of forked workers are not those of this test.
+    spawn = multiprocessing.get_context("spawn")
+    monkeypatch.setattr("flatland.scenarios.workers._CONTEXT", spawn)
+    runs, plan = suite(["Prints"], limits=WorkerLimits(shows_output=is_shown))
     assert carry_out(runs, plan)[runs[0].key].row["passed"]
-    assert capfd.readouterr().out == ""
-
-
-def test_what_a_controller_prints_can_be_shown(suite, capfd):
-    runs, plan = suite(["Prints"], limits=WorkerLimits(shows_output=True))
-    carry_out(runs, plan)
-    assert "xxxx" in capfd.readouterr().out
+    assert ("xxxx" in capfd.readouterr().out) == is_shown
 
 
 def test_the_processes_end_with_the_suite(suite):
@@ -202,12 +209,3 @@ def test_a_suite_needs_runs_with_different_names(suite):
         run_suite([], plan)
     with pytest.raises(SuiteError, match="two scenario files have the same name"):
         run_suite([*runs, Run(runs[0].scenario, runs[0].controller, runs[0].seed)], plan)
-
-
-def test_the_signal_of_a_killed_worker_is_named(suite, room):
-    runs, plan = suite(["Drives"])
-    (room / "own.py").write_text(
-        f"import os\ndef Drives(scan, pose, goal): os.kill(os.getpid(), {int(signal.SIGSEGV)})"
-    )
-    (result,) = carry_out(runs, plan).values()
-    assert f"(signal {int(signal.SIGSEGV)})" in result.row["error"]
