@@ -338,10 +338,11 @@ def test_labels_equal_those_of_single_rays(seed: int) -> None:
         assert scan.hits[label - 1] == (hit.fixture.body.id, hit.fixture.category_bits)
 
 
-def test_of_coincident_walls_the_one_in_the_mask_is_labelled() -> None:
-    world, sensor = room()
-    walls = {bits: add_edge(world, [3, -8, 3, 8], None, bits) for bits in (2, 4)}
-    for bits, wall in walls.items():
+def test_of_coincident_walls_the_first_one_in_the_mask_is_labelled() -> None:
+    world = PhysicsWorld()
+    sensor = world.create_body("static", (0, 0, 0))
+    walls = [add_edge(world, [3, -8, 3, 8], None, bits) for bits in (2, 4, 2)]
+    for bits, wall in ((2, walls[0]), (4, walls[1])):
         scan = finder(FRONT, mask=bits).scan_labels(sensor, 1, 1)
         assert (scan.labels == 1).all()
         assert scan.hits == [(wall.id, bits)]
@@ -374,6 +375,14 @@ def test_a_cone_measures_the_nearest_hit_of_its_rays(seed: int) -> None:
     cone = finder(angles, is_cone=True).scan(sensor, 1, 1)
     assert cone.ranges.tolist() == [finder(angles).scan(sensor, 1, 1).ranges.min()]
     assert cone.intensities is None
+
+
+def test_a_cone_does_not_contain_the_readings_of_an_earlier_scan() -> None:
+    world, sensor = room()
+    add_edge(world, [-1, -8, -1, 8], None)
+    assert finder(np.full(64, math.pi)).scan(sensor, 1, 1).ranges.max() < 1.1
+    cone = finder(np.linspace(-0.1, 0.1, 32), is_cone=True)  # a multiple of the width of a block
+    assert cone.scan(sensor, 1, 1).ranges.min() > 7.9
 
 
 def test_an_empty_cone_has_no_hit() -> None:
