@@ -158,11 +158,12 @@ def test_a_layer_waits_for_its_map(start: Any, caplog: pytest.LogCaptureFixture)
             lambda size=size: [m.grid.cells.shape[0] for m in published.sent][-1:] == [size],
         )
     assert 'Layer "2d": map of 9 x 9 cells from topic "site/map"' in caplog.text
-    # An invalid one does not, and a reset keeps it.
+    # An invalid one, or one beyond the range of the physics, does not, and a reset keeps it.
     receive(OccupancyGrid((0.0, 0.0, 0.0), 0.0, np.zeros((3, 3), np.int8)))
+    receive(OccupancyGrid((1e30, 0.0, 0.0), 1.0, box(9).cells))
     assert node.call("reset_world", seed=-1, keep_time=False).success
     assert ahead(node) == pytest.approx(4, abs=1e-5)
-    assert 'Layer "2d": cannot use the map of topic "site/map"' in caplog.text
+    assert caplog.text.count('Layer "2d": cannot use the map of topic "site/map": ') == 2
 
 
 def test_grids_are_converted_in_the_threads_that_receive_them(

@@ -287,6 +287,7 @@ def test_limits_are_those_of_the_values_that_are_accepted(field: Any) -> None:
     above = low + (1 if isinstance(low, int) else 1e-3)
     field.metadata["read"](above)
     assert above <= high
+    assert math.isinf(high) or high < 2**63, "ROS 2 has integers of 64 bits"
     with pytest.raises(ParameterError):
         read(**{field.name: low - 1})
     if high < 2**63 - 1:
