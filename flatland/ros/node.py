@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import gc
+import importlib
 import logging
 import math
 import threading
@@ -21,6 +22,7 @@ from flatland.node.parameters import (
 )
 from flatland.node.run import NodeRun
 from flatland.ros.message_types import select_package
+from flatland.ros.rospy_import import defer_catkin
 
 if TYPE_CHECKING:
     from flatland.ros.transport.registrar import Registrar
@@ -34,6 +36,7 @@ _REGISTRATION_TIMEOUT: Final = 0.1  # s, for the registration of `/clock`
 _UNREGISTER_TIMEOUT: Final = 2.0  # s
 _STOP_POLL_PERIOD: Final = 0.05  # s between two checks for a stop request without a master
 _SHUTDOWN_POLL_PERIOD: Final = 0.002  # s
+_SERVED_WORLD: Final = "flatland.node.served_world"
 # The reason that the ROS master gives to a node whose name another node has taken.
 _REPLACED: Final = "new node registered with same name"
 
@@ -85,9 +88,15 @@ class ServerNode:
 
     def run(self) -> int:
         """Runs until a stop is requested, and returns the exit code."""
+        defer_catkin()
         import rosgraph
         import rospy
 
+        # While this thread waits for responses of the master. Not a daemon: the interpreter must
+        # not end while an extension is imported.
+        threading.Thread(
+            target=importlib.import_module, args=(_SERVED_WORLD,), name="flatland-import"
+        ).start()
         try:
             if not self._wait_for_master():
                 return 0
@@ -198,8 +207,7 @@ class ServerNode:
             clock = SimulatedClock(transport, parameters.clock_rate)
         else:
             clock = WallClock()
-        # Other nodes have a valid time while the following modules are imported, which takes as
-        # long as everything before. The import would delay the registration.
+        # Other nodes have a valid time while the world is loaded.
         self._registrar.flush(_REGISTRATION_TIMEOUT)
         from flatland.ros.transport.master_watch import MasterWatch
 

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable
 from typing import Final
 
+from flatland.ros.rospy_import import defer_catkin
 from flatland.viewer.restarts import STOP_SIGNALS, run_with_restarts, stop_signals_blocked
 
 _LOG = logging.getLogger("flatland")
@@ -30,6 +31,7 @@ def main() -> int:
 
 
 def _run(disable_restarts: Callable[[], None]) -> int:
+    defer_catkin()
     import rosgraph
     import rospy
 

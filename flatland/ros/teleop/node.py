@@ -11,6 +11,7 @@ import time
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.node.parameters import ParameterError, TeleopParameters, read_table
+from flatland.ros.rospy_import import defer_catkin
 from flatland.ros.teleop.held_key import HeldKey, decode
 from flatland.ros.teleop.terminal import KeyInput, StopRequests
 
@@ -46,6 +47,7 @@ def main() -> int:
             "the standard input is not a terminal: start it in a terminal, by "
             "`rosrun flatland teleop_key` or `roslaunch flatland teleop.launch`"
         )
+    defer_catkin()
     import rosgraph
     import rospy
 

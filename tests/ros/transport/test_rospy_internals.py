@@ -3,9 +3,26 @@
 from __future__ import annotations
 
 import inspect
+import sys
 
 import rospy.impl.rosout
+from programs import run_program
 from rospy.impl.paramserver import ParamServerCache
+
+SEARCH_AFTER_A_SHORT_IMPORT = """
+import sys
+from flatland.ros.rospy_import import defer_catkin
+
+defer_catkin()
+import rospy, roslib.packages
+
+assert "catkin_pkg" not in sys.modules and "pyparsing" not in sys.modules
+[found] = roslib.packages.find_node("flatland", "flatland_server")
+assert "catkin_pkg" in sys.modules
+defer_catkin()
+assert roslib.packages.find_node("flatland", "flatland_server") == [found]
+print(found)
+"""
 
 
 def test_cached_parameters_need_no_master() -> None:
@@ -16,3 +33,10 @@ def test_cached_parameters_need_no_master() -> None:
     cache = ParamServerCache()
     cache.set("/pinned", False)
     assert cache.get("/pinned") is False
+
+
+def test_rospy_is_imported_without_catkin_until_a_package_is_searched(
+    ros_environment: dict[str, str], server_path: str
+) -> None:
+    program = [sys.executable, "-c", SEARCH_AFTER_A_SHORT_IMPORT]
+    assert run_program(program, env=ros_environment, check=True).stdout.strip() == server_path
