@@ -144,6 +144,7 @@ _ROOMS = {
             "tests/ros/test_teleop.py",
             "tests/ros/test_start.py",
             "tests/ros/test_shutdown.py",
+            "tests/ros/test_wall_time.py",
         ),
     ),
     # Without tests that take long; each still serves for the file that it mirrors.

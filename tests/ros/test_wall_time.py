@@ -92,9 +92,19 @@ def test_markers_have_wall_time(server: Any, ros: Any) -> None:
             assert_current(marker.header.stamp)
 
 
-def test_contradiction_to_other_nodes_is_reported(
-    launcher: Any, ros: Any, write_world: Callable[..., Path]
+@pytest.mark.parametrize(
+    ("own", "others", "text"),
+    [
+        (True, False, r"\[WARN\].*/use_sim_time is not true: other nodes do not follow"),
+        (False, True, r"\[WARN\].*/use_sim_time is true.*publishes no /clock"),
+    ],
+)
+def test_a_contradiction_to_other_nodes_is_reported(
+    launcher: Any, ros: Any, write_world: Callable[..., Path], own: bool, others: bool, text: str
 ) -> None:
-    ros.master.setParam("/use_sim_time", True)
-    process = launcher.start("__name:=other", world_path=write_world(), use_sim_time=False)
-    process.wait_for_line(r"\[WARN\].*/use_sim_time is true.*publishes no /clock")
+    ros.master.setParam("/use_sim_time", others)
+    try:
+        process = launcher.start("__name:=other", world_path=write_world(), use_sim_time=own)
+        process.wait_for_line(text)
+    finally:
+        ros.master.setParam("/use_sim_time", True)

@@ -205,10 +205,11 @@ class Publisher:
     def _take_over(self, impl: Any) -> None:
         """Creates an outbox for each further connection, and observes the connections."""
         if "add_connection" not in vars(impl):  # Publishers of one topic share the connections.
-            add_connection = impl.add_connection
+            # Without `self`: the publisher may be closed before the others of its topic.
+            add_connection, queue_size = impl.add_connection, self._queue_size
 
             def add_with_outbox(transport: Any) -> bool:
-                Outbox(transport, self._queue_size)
+                Outbox(transport, queue_size)
                 added: bool = add_connection(transport)
                 return added
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import socket
 import struct
 import threading
+import weakref
 from collections.abc import Callable, Iterator
 from io import BytesIO
 from typing import Any
@@ -142,6 +144,18 @@ def test_a_topic_is_ready_after_its_owner_was_notified(registrar: Registrar, ros
     publisher.close()
     assert ready.is_set()
     assert early == [False]
+
+
+def test_a_closed_publisher_is_freed_while_another_one_has_its_topic(registrar: Registrar) -> None:
+    first, second = (Publisher(registrar, PLAIN, Int32, queue_size=1) for _ in range(2))
+    assert registrar.flush(TIMEOUT)
+    reference = weakref.ref(first)
+    first.close()
+    assert registrar.flush(TIMEOUT)
+    del first
+    gc.collect()
+    assert reference() is None
+    second.close()
 
 
 def test_nothing_is_serialized_without_subscribers(registrar: Registrar) -> None:
