@@ -41,41 +41,21 @@ def shell(installed, tmp_path):
     return run_script
 
 
-def test_ros_tools_find_the_package(shell, installed):
-    done = shell('set -eu; . "$0"; rospack find flatland; rosmsg show flatland/Collisions')
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith(f"{installed}/.venv/share/flatland\n")
-    assert "flatland/Collision[] collisions" in done.stdout
-    assert "string entity_A" in done.stdout
-
-
-def test_ros_tools_find_the_packages_of_the_reference(shell, installed):
-    names = "flatland_msgs flatland_plugins flatland_server flatland_viz"
+def test_ros_tools_find_the_package_and_those_of_the_reference(shell, installed):
+    """rosservice runs in /usr/bin/python3 and imports the class of the service."""
+    names = "flatland flatland_msgs flatland_plugins flatland_server flatland_viz"
     done = shell(
         f'set -eu; . "$0"; for name in {names}; do rospack find $name; done; '
         "rosmsg show -r flatland_msgs/Collisions; /usr/bin/python3 -c "
-        "'import flatland_msgs.srv; print(flatland_msgs.srv.SpawnModel._type)'"
+        "'import flatland.srv, flatland_msgs.srv; print(flatland.srv.__file__);"
+        " print(flatland_msgs.srv.SpawnModel._type)'"
     )
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert lines[:4] == [f"{installed}/.venv/share/{name}" for name in names.split()]
+    assert lines[:5] == [f"{installed}/.venv/share/{name}" for name in names.split()]
     assert "Collision[] collisions" in lines
+    assert lines[-2].startswith(f"{installed}/.venv/lib")
     assert lines[-1] == "flatland_msgs/SpawnModel"
-
-
-def test_system_python_imports_services(shell, installed):
-    """rosservice runs in /usr/bin/python3 and imports the class of the service."""
-    done = shell('. "$0"; rossrv show flatland/SpawnModel; /usr/bin/python3 -c "'
-                 'import flatland.srv; print(flatland.srv.__file__)"')  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert f"{installed}/.venv/lib" in done.stdout
-
-
-@pytest.mark.parametrize("package", ["flatland", "flatland_server"])
-def test_roslaunch_finds_the_launch_files(shell, package):
-    done = shell(f'. "$0"; roslaunch --nodes {package} server.launch show_viz:=false')
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip() == "/flatland_server"
 
 
 def test_second_source_has_no_effect(shell):

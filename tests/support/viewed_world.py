@@ -34,7 +34,7 @@ bodies:
   - {name: base, color: [1, 0, 1, 1], footprints: [{type: circle, radius: 0.4, density: 1}]}
 plugins:
   - {type: DiffDrive, name: drive, body: base, pub_rate: 50, odom_frame_id: map}
-  - {type: Laser, name: laser, body: base, range: 6, update_rate: 10,
+  - {type: Laser, name: laser, body: base, range: 6, update_rate: 4,
      angle: {min: -3.1, max: 3.1, increment: 0.02}}
 """
 CRATE: Final = """
