@@ -307,6 +307,10 @@ class Launcher:
         self._processes.append(process)
         return process
 
+    def node(self, *arguments: str) -> Program:
+        """Starts a server with a command line."""
+        return self.program(self._server, *arguments)
+
     def start(self, *arguments: str, **parameters: object) -> Program:
         """Starts a server with private parameters, without waiting for it."""
         clear = rosgraph.Master("/flatland_tests")
@@ -316,7 +320,7 @@ class Launcher:
         # On a busy machine, a node may need longer than its default to end.
         parameters = {"shutdown_timeout": TIMEOUT, **parameters}
         given = [f"_{name}:={value}" for name, value in parameters.items()]
-        return self.program(self._server, *arguments, *given)
+        return self.node(*arguments, *given)
 
     def server(self, world: Path, *arguments: str, **parameters: object) -> Program:
         """Starts a server and waits until it has opened all its topics and services."""

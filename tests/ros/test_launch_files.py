@@ -1,6 +1,6 @@
 """The arguments of the launch files; roslaunch reads the files in this process and starts nothing.
 
-`test_kidnapping.py`, `test_benchmark.py` and others start them.
+`test_start.py`, `test_benchmark.py` and others start them.
 """
 
 from __future__ import annotations

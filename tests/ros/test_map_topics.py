@@ -99,6 +99,5 @@ def test_map_is_latched_and_created_once(ros: Any, server: Any) -> None:
     assert second.next().header.stamp == first.header.stamp
     assert second.rest() == []
     assert ros.call("/static_map", GetMap).map.header.stamp == first.header.stamp
-    lines = [line for line in server.lines if "publishing layer" in line]
-    assert len(lines) == 1
-    assert 'publishing layer "low" as a map of 3 x 2 cells of 0.5 m' in lines[0]
+    server.wait_for_line('publishing layer "low" as a map of 3 x 2 cells of 0.5 m')
+    assert server.output.count("publishing layer") == 1

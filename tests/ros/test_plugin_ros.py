@@ -8,15 +8,14 @@ from typing import Any
 
 import pytest
 from std_msgs.msg import Float32, String
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import SetBool
 
 PLUGINS = """
 import sys
-import threading
 from dataclasses import dataclass
 
 from std_msgs.msg import Float32, String
-from std_srvs.srv import SetBool, Trigger, TriggerResponse, SetBoolResponse
+from std_srvs.srv import SetBool, Trigger
 
 import flatland
 from flatland.ros.adapters import register_adapter
@@ -42,12 +41,7 @@ class Talker(flatland.ModelPlugin):
         self.hello.publish(String("from " + self.ros.param("town", "nowhere")))
         self.echo = self.ros.advertise("echo", String)
         self.ros.subscribe("listen", String, self.on_message)
-        self.ros.advertise_service("touch", Trigger, self.on_touch)
         self.ros.advertise_service("/fail", SetBool, self.on_fail)
-        self.world.output_thread = None
-
-    def before_physics_step(self, timekeeper):
-        self.thread = threading.get_ident()
 
     def on_message(self, message):
         if message.data == "raise":
@@ -60,11 +54,7 @@ class Talker(flatland.ModelPlugin):
             except flatland.WorldError as error:
                 self.echo.publish(String(str(error)))
             return
-        same = threading.get_ident() == self.thread
-        self.echo.publish(String(f"{message.data} {same}"))
-
-    def on_touch(self, request):
-        return TriggerResponse(threading.get_ident() == self.thread, self.model.name)
+        self.echo.publish(message)
 
     def on_fail(self, request):
         if request.data:
@@ -150,13 +140,6 @@ def test_latched_message_of_on_initialize_holds_a_parameter(ros: Any, talker: No
     assert message._connection_header["latching"] == "1"
 
 
-def test_callback_runs_in_the_thread_that_steps_the_world(ros: Any, talker: None) -> None:
-    del talker
-    echo = ros.ready_topic("/t1/echo", String)
-    ros.publisher("/t1/listen", String).publish(String("hi"))
-    assert echo.next().data == "hi True"
-
-
 def test_callback_that_raises_is_logged_and_called_again(
     ros: Any, talker: None, server: Any
 ) -> None:
@@ -166,14 +149,8 @@ def test_callback_that_raises_is_logged_and_called_again(
     for word, kind in (("raise", "ValueError"), ("exit", "SystemExit")):
         publisher.publish(String(word))
         publisher.publish(String("hi"))
-        assert echo.next().data == "hi True"
+        assert echo.next().data == "hi"
         server.wait_for_line(f"{kind}: expected")
-
-
-def test_service_runs_in_the_thread_that_steps_the_world(ros: Any, talker: None) -> None:
-    del talker
-    answer = ros.call("/t1/touch", Trigger)
-    assert (answer.success, answer.message) == (True, "talker")
 
 
 def test_exception_of_a_service_is_reported_to_the_client(ros: Any, talker: None) -> None:
@@ -229,7 +206,7 @@ def test_second_service_of_the_same_name_is_refused(ros: Any, talker: None) -> N
     assert answer.success is False
     first = 'Model Plugin "p" type "test::Talker" model "talker"'
     assert f'service "/fail" exists already, used by {first}' in answer.message
-    assert "/t2/touch" not in ros.registered()["services"]
+    assert "/t2/hello" not in ros.registered()["publishers"]
 
 
 @pytest.mark.parametrize("method", ["step", "close"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import signal
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,61 +17,58 @@ from waiting import wait_until
 from flatland.recording import Replay
 from flatland.recording.log_file import read_recording
 
-Drive = Callable[[], tuple[Any, Path, Path]]
 
-
-@pytest.fixture
-def drive(ros: Any, launcher: Any, write_world: Callable[..., Path], tmp_path: Path) -> Drive:
-    """Returns a function that drives a robot of a recorded node, and changes models."""
-
-    def run() -> tuple[Any, Path, Path]:
-        world = write_world("[{name: robot, model: robot.model.yaml}]")
-        recording, messages = tmp_path / "run.flog", tmp_path / "run.mcap"
-        server = launcher.server(
-            world, record=recording, record_mcap=messages, seed=1, show_viz=True, lockstep=True
-        )
-        # The recording must be the same with debug markers and subscribers, which a replay has not.
-        ros.topic("/flatland_server/debug/model/robot", MarkerArray)
-        ros.topic("/scan", LaserScan)
-        odometry = ros.topic("/odometry/ground_truth", Odometry)
-
-        def drive_until(accept: Callable[[Odometry], bool]) -> None:
-            def accepted() -> bool:
-                ros.step(0.1)
-                return any(map(accept, odometry.rest(0)))
-
-            wait_until("a drive", accepted)
-
-        publisher = ros.publisher("/cmd_vel", Twist)
-        command = Twist()
-        command.linear.x = 0.3
-        publisher.publish(command)
-        drive_until(lambda odometry: odometry.pose.pose.position.x > 0.1)
-        assert ros.spawn("ball.model.yaml", "ball", pose=(2.0, 2.0, 0.0)).success
-        assert not ros.spawn("ball.model.yaml", "ball").success
-        assert ros.move("ball", (2.0, -2.0, 1.0)).success
-        command.angular.z = 0.5
-        publisher.publish(command)
-        drive_until(lambda odometry: odometry.twist.twist.angular.z > 0.4)
-        assert ros.delete("ball").success
-        while ros.step(0.5) < 2_000_000_000:
-            pass
-        return server, recording, messages
-
-    return run
-
-
-def test_a_run_of_the_node_is_repeated_without_ros(drive: Drive) -> None:
-    server, recording, messages = drive()
-    assert server.stop() == 0
-    kinds = [record.get("kind") for record in read_recording(recording).records]
-    assert kinds.count("command") == 2
-    assert kinds[-1] == "end"
+def replayed_steps(recording: Path) -> int:
+    """Replays a recording without a difference, and returns the number of its last step."""
     replay = Replay(recording)
     difference = replay.run()
     replay.close()
     assert difference is None
-    assert replay.last_step > 300
+    return replay.last_step
+
+
+def test_a_run_of_the_node_is_repeated_without_ros(
+    ros: Any, launcher: Any, write_world: Callable[..., Path], tmp_path: Path
+) -> None:
+    world = write_world("[{name: robot, model: robot.model.yaml}]")
+    recording, messages = tmp_path / "run.flog", tmp_path / "run.mcap"
+    server = launcher.server(
+        world, record=recording, record_mcap=messages, seed=1, show_viz=True, lockstep=True
+    )
+    # The recording must be the same with debug markers and subscribers, which a replay has not.
+    ros.topic("/flatland_server/debug/model/robot", MarkerArray)
+    ros.topic("/scan", LaserScan)
+    odometry = ros.topic("/odometry/ground_truth", Odometry)
+
+    def drive_until(accept: Callable[[Odometry], bool]) -> None:
+        def accepted() -> bool:
+            ros.step(0.1)
+            return any(map(accept, odometry.rest(0)))
+
+        wait_until("a drive", accepted)
+
+    publisher = ros.publisher("/cmd_vel", Twist)
+    command = Twist()
+    command.linear.x = 0.3
+    publisher.publish(command)
+    drive_until(lambda odometry: odometry.pose.pose.position.x > 0.1)
+    assert ros.spawn("ball.model.yaml", "ball", pose=(2.0, 2.0, 0.0)).success
+    assert not ros.spawn("ball.model.yaml", "ball").success
+    assert ros.move("ball", (2.0, -2.0, 1.0)).success
+    command.angular.z = 0.5
+    publisher.publish(command)
+    drive_until(lambda odometry: odometry.twist.twist.angular.z > 0.4)
+    assert ros.delete("ball").success
+    while ros.step(0.5) < 2_000_000_000:
+        pass
+    # What is left if the node is killed.
+    unfinished = shutil.copy(recording, tmp_path / "unfinished.flog")
+    assert server.stop() == 0
+    assert replayed_steps(unfinished) >= 200
+    assert replayed_steps(recording) > 300
+    kinds = [record.get("kind") for record in read_recording(recording).records]
+    assert kinds.count("command") == 2
+    assert kinds[-1] == "end"
 
     read_messages = pytest.importorskip("mcap_ros1.reader").read_ros1_messages
     poses = [
@@ -81,17 +78,6 @@ def test_a_run_of_the_node_is_repeated_without_ros(drive: Drive) -> None:
     assert poses[0] == (0, 0.0)
     assert len(poses) == poses[-1][0] * 50 // 10**9 + 1  # 50 Hz, with and without subscribers
     assert poses[-1][1] > 0.1
-
-
-def test_the_recording_survives_the_end_of_the_node(drive: Drive) -> None:
-    server, recording, _ = drive()
-    server.send(signal.SIGKILL)
-    server.wait()
-    replay = Replay(recording)
-    difference = replay.run()
-    replay.close()
-    assert difference is None
-    assert replay.last_step >= 200
 
 
 def test_a_file_that_cannot_be_created_is_a_fatal_error(

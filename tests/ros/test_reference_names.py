@@ -313,33 +313,17 @@ def test_arguments_and_defaults_of_the_reference(
     assert arguments == defaults
 
 
-def test_benchmark_of_the_reference(launcher: Any, ros: Any, world: Path) -> None:
-    process = launcher.launch(
-        "flatland_server",
-        "benchmark.launch",
-        f"world_path:={world}",
-        "update_rate:=10",  # without effect
-        "step_size:=0.01",
-        "benchmark_duration:=10",
-        "show_viz:=true",
-        "simplify_map:=1",
-    )
-    process.wait_for_line("benchmark: 1000 iterations")
-    assert process.wait() == 0
-    parameters = ros.master.getParam("/flatland_benchmark")
-    assert parameters["simplify_map"] == 1
-
-
 def test_perf_records_the_benchmark_on_request(
     ros_environment: dict[str, str], checkout: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ROS_PACKAGE_PATH", ros_environment["ROS_PACKAGE_PATH"])
     path = checkout / "compat" / "flatland_server" / "launch" / "benchmark.launch"
     for given, prefix in (("false", None), ("true", "perf record --call-graph dwarf")):
-        files = [(str(path), [f"use_perf:={given}"])]
+        files = [(str(path), [f"use_perf:={given}", "simplify_map:=1"])]
         config = roslaunch.config.load_config_default(files, None, verbose=False)
         [node] = config.nodes
         assert (node.package, node.type) == ("flatland_server", "flatland_server")
+        assert config.params["/flatland_benchmark/simplify_map"].value == 1
         assert (node.launch_prefix or None) == prefix or node.launch_prefix.startswith(prefix)
 
 

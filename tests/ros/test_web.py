@@ -31,18 +31,11 @@ def world(write_world: Callable[..., Path]) -> Path:
 
 @pytest.fixture(scope="module")
 def url(module_launcher: Any, world: Path) -> str:
-    """A node started by roslaunch, with the viewer on any free port."""
-    launch = module_launcher.launch(
-        "flatland",
-        "server.launch",
-        f"world_path:={world}",
-        "show_viz:=false",
-        "web:=true",
-        "web_port:=0",
-        "if_blocked:=refuse",
-        f"model_path:={world.parent}",
+    """A node with the viewer on any free port."""
+    server = module_launcher.server(
+        world, web=True, web_port=0, if_blocked="refuse", model_path=world.parent
     )
-    return str(launch.wait_for_line(PORT_LINE)[1])
+    return str(server.wait_for_line(PORT_LINE)[1])
 
 
 @pytest.fixture

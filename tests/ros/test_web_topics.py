@@ -106,17 +106,10 @@ def url(module_launcher: Any, write_world: Callable[..., Path]) -> str:
         listener=LISTENER,
     )
     module_launcher.add_plugins(world.parent, LISTENER_PLUGIN, "listener_plugin")
-    launch = module_launcher.launch(
-        "flatland",
-        "server.launch",
-        f"world_path:={world}",
-        "show_viz:=false",
-        "web:=true",
-        "web_port:=0",
-        "web_token:=0123456789abcdef",
-        "web_view_token:=fedcba9876543210",
+    server = module_launcher.server(
+        world, web=True, web_port=0, web_token="0123456789abcdef", web_view_token="fedcba9876543210"
     )
-    return str(launch.wait_for_line(r"viewer in the browser: (http://\S+)")[1])
+    return str(server.wait_for_line(r"viewer in the browser: (http://\S+)")[1])
 
 
 @pytest.fixture

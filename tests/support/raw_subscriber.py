@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import select
-import socket
-import struct
 from typing import Any
-from urllib.parse import urlparse
 from xmlrpc.client import ServerProxy
 
-from waiting import TIMEOUT
+import tcpros
 
 
 class RawSubscriber:
@@ -41,11 +38,7 @@ class RawSubscriber:
         node = ServerProxy(master.lookupNode(only))
         code, text, protocol = node.requestTopic(name, topic, [["TCPROS"]])
         assert code == 1, text
-        self.socket = socket.socket()
-        if receive_buffer is not None:
-            self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
-        self.socket.settimeout(TIMEOUT)
-        self.socket.connect((urlparse(f"//{protocol[1]}").hostname, protocol[2]))
+        self.socket = tcpros.connect((protocol[1], protocol[2]), receive_buffer)
         fields = {
             "callerid": name,
             "topic": topic,
@@ -53,14 +46,12 @@ class RawSubscriber:
             "md5sum": message_type._md5sum,
             "message_definition": message_type._full_text,
         }
-        lines = [f"{name}={value}".encode() for name, value in fields.items()]
-        header = b"".join(struct.pack("<I", len(line)) + line for line in lines)
-        self.socket.sendall(struct.pack("<I", len(header)) + header)
-        assert b"md5sum" in self.read_frame()
+        self.socket.sendall(tcpros.header(fields))
+        assert b"md5sum" in tcpros.read_frame(self.socket)
 
     def next(self) -> Any:
         """Reads one message."""
-        return self._message_type().deserialize(self.read_frame())
+        return self._message_type().deserialize(tcpros.read_frame(self.socket))
 
     def received(self) -> list[Any]:
         """Reads the messages that have arrived, without waiting for the first byte of another."""
@@ -68,19 +59,6 @@ class RawSubscriber:
         while select.select([self.socket], [], [], 0.0)[0]:
             messages.append(self.next())
         return messages
-
-    def read_frame(self) -> bytes:
-        """Reads the bytes of one message, or of the header."""
-        (size,) = struct.unpack("<I", self._read(4))
-        return self._read(size)
-
-    def _read(self, size: int) -> bytes:
-        data = b""
-        while len(data) < size:
-            part = self.socket.recv(size - len(data))
-            assert part, "the publisher closed the connection"
-            data += part
-        return data
 
     def close(self) -> None:
         """Closes the connection."""

@@ -127,10 +127,10 @@ def core(launcher: Any) -> Core:
     return core
 
 
-def start_server(core: Core, launcher: Any, server_path: str, world: Path) -> Any:
+def start_server(core: Core, launcher: Any, world: Path) -> Any:
     """Starts a node that publishes debug markers, and waits until all its topics are registered."""
     arguments = (f"_world_path:={world}", "_show_viz:=true", "_custom:=value")
-    server = launcher.program(server_path, *arguments, f"_shutdown_timeout:={TIMEOUT}")
+    server = launcher.node(*arguments, f"_shutdown_timeout:={TIMEOUT}")
     service = "/wait_until_ready"
     wait_until("its services", lambda: service in registered(core.master)[2])
     address = tcpros.service_address(core.master, service)
@@ -141,12 +141,12 @@ def start_server(core: Core, launcher: Any, server_path: str, world: Path) -> An
 
 
 def test_node_registers_again_with_a_new_master(
-    core: Core, launcher: Any, server_path: str, write_world: Callable[..., Path]
+    core: Core, launcher: Any, write_world: Callable[..., Path]
 ) -> None:
     world = write_world("[{name: robot, model: talker.model.yaml}]", talker=TALKER)
     launcher.add_plugins(world.parent, PLUGIN, "test_talker")
     core.master.setParam("/use_sim_time", True)
-    server = start_server(core, launcher, server_path, world)
+    server = start_server(core, launcher, world)
     client = launcher.program(sys.executable, "-c", CLIENT)
     client.wait_for_line("called")
     before = registered(core.master)
