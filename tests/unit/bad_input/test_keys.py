@@ -641,8 +641,8 @@ def test_a_model(
     running_world: flatland.World, folder: Path, unchanged: Any, section: Section
 ) -> None:
     def load() -> None:
-        with unchanged(running_world):
-            running_world.spawn_model("broken.model.yaml", "robot", "robot", (9, 9, 0))
-            running_world.delete_model("robot")
+        running_world.spawn_model("broken.model.yaml", "robot", "robot", (9, 9, 0))
+        running_world.delete_model("robot")
 
-    check_all(section, folder / "broken.model.yaml", load)
+    with unchanged(running_world):
+        check_all(section, folder / "broken.model.yaml", load)

@@ -210,7 +210,7 @@ def test_blank_lines_with_tabs_do_not_change_line_numbers() -> None:
 
 @pytest.mark.parametrize(
     "line",
-    ["\t" * 1_000_000 + "x", "-\t" * 500_000, " -" * 500_000 + "\t#"],
+    ["\t" * 400_000 + "x", "-\t" * 200_000, " -" * 200_000 + "\t#"],
     ids=["tabs", "dashes and tabs", "dashes and a comment"],
 )
 def test_long_lines_of_white_space_are_read_in_linear_time(line: str) -> None:
@@ -267,16 +267,6 @@ def test_supported_encodings(tmp_path: Path, encoding: str) -> None:
     node = root.entries["name"]
     assert isinstance(node, ScalarNode)
     assert node.text == "Rübe 🐢"
-
-
-def test_windows_line_endings(tmp_path: Path) -> None:
-    file = tmp_path / "w.yaml"
-    file.write_bytes(b"a: 1\r\nb: x\r\nc: \xff\r\n")
-    assert "line 3 col 4, byte 0xff is not valid UTF-8" in file_failure(file)
-    file.write_bytes(b"a: 1\r\nb: x\r\n")
-    (root,) = load_documents(str(file), Inputs())
-    assert isinstance(root, MapNode)
-    assert root.entries["b"].line == 2
 
 
 def file_failure(path: Path | str) -> str:

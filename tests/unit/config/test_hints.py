@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-import flatland
 from flatland.config import hints
 
 
@@ -86,23 +85,3 @@ def test_similar_files(tmp_path: Path):
     folder = tmp_path / "no"
     assert hints.similar_file(str(folder / "a")) == f'the folder "{folder}" does not exist'
     assert hints.similar_file("\0") == ""
-
-
-def test_an_error_has_a_place_and_a_hint_besides_its_text():
-    reader = flatland.YamlReader.from_string("a: 1\nb: 2 m\n")
-    with pytest.raises(flatland.YamlError) as caught:
-        reader.get("b", "float")
-    error = caught.value
-    assert error.place == flatland.Place("", 2)
-    assert error.hint == "numbers are written without a unit: 2"
-    assert str(error) == 'Flatland YAML: Error converting entry "b" to float [line 2]'
-
-
-def test_the_error_of_a_plugin_has_the_place_of_the_value(files):
-    laser = "{type: Laser, name: l, body: base,\n range: far}"
-    with pytest.raises(flatland.PluginError) as caught:
-        files.load_model(f"bodies: [{{name: base, footprints: []}}]\nplugins:\n- {laser}\n")
-    place = caught.value.place
-    assert place is not None
-    assert (Path(place.path).name, place.line) == ("robot.model.yaml", 4)
-    assert str(caught.value).endswith(place.suffix)

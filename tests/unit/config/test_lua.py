@@ -181,21 +181,20 @@ def test_endless_expressions_are_stopped(
 
 
 def test_reading_parameters_does_not_reset_the_time_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lua, "TIME_LIMIT", 0.2)
+    monkeypatch.setattr(lua, "TIME_LIMIT", 0.04)
     code = """
-        local stop = os.clock() + 0.05
+        local stop = os.clock() + 0.01
         while os.clock() < stop do end
         for i = 1, 100 do param("p" .. i) end
         return 1
     """
-    assert "the time limit of 0.2 s is exceeded" in failure(code)
+    assert "the time limit of 0.04 s is exceeded" in failure(code)
 
 
 HUGE = {
     "table": "local t = {} while true do t[#t + 1] = {} end return 1",
     "string": "local s = 'x' while true do s = s .. s end return 1",
     "rep": "return #string.rep('x', 1e9)",
-    "rep method": "return #('x'):rep(1e9)",
     "rep of rep": "return #('x'):rep(1e6):rep(1e6)",
     "concat": """local t = {} for i = 1, 1000 do t[i] = ('x'):rep(1e5) end
         while true do t[1] = table.concat(t) end return 1""",
@@ -215,7 +214,7 @@ from flatland.config import lua
 
 runtime, huge = json.loads(sys.stdin.read())
 lua._RUNTIMES = (runtime,)
-lua.TIME_LIMIT = 0.1
+lua.TIME_LIMIT = 0.03
 peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
 before = peak()
 for code in huge:
@@ -240,7 +239,7 @@ def test_memory_is_bounded(runtime: str) -> None:
     *answers, grown = done.stdout.splitlines()
     assert len(answers) == len(HUGE)
     for name, answer in zip(HUGE, answers, strict=True):
-        assert answer.endswith(("not enough memory", "the time limit of 0.1 s is exceeded")), (
+        assert answer.endswith(("not enough memory", "the time limit of 0.03 s is exceeded")), (
             name,
             answer,
         )
@@ -338,7 +337,7 @@ def test_large_inputs_are_rejected_before_evaluation() -> None:
 
 def test_the_number_of_parameters_is_limited() -> None:
     with pytest.raises(EvalError, match="more than 200 parameters are read"):
-        run("for i = 1, 1e6 do param('p' .. i) end return 1", {})
+        run("for i = 1, 1e3 do param('p' .. i) end return 1", {})
 
 
 def test_unset_names_are_reported_once_and_limited_in_number() -> None:
@@ -410,10 +409,10 @@ def test_random_numbers_depend_on_the_seed_alone(runtime: str) -> None:
 
 
 def test_random_numbers_of_different_seeds_are_uniform() -> None:
-    sample = sorted(numbers("math.random()", range(500)))
+    sample = sorted(numbers("math.random()", range(200)))
     assert all(0.0 <= number < 1.0 for number in sample)
     # The Kolmogorov-Smirnov distance of a uniform sample exceeds this with a probability of 1e-6.
-    assert max(abs(number - i / 500) for i, number in enumerate(sample)) < 2.69 / 500**0.5
+    assert max(abs(number - i / 200) for i, number in enumerate(sample)) < 2.69 / 200**0.5
 
 
 @pytest.mark.parametrize(

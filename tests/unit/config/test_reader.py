@@ -280,17 +280,6 @@ def test_lists_of_a_valid_size() -> None:
     assert reader.get_list("no", "int", None) is None
 
 
-def test_unknown_keys_of_a_nested_map(file: Path) -> None:
-    reader = read_file(file, "plugins:\n  - type: X\n    angle: {min: 1,\n      mix: 2}\n")
-    plugin = reader.subnode("plugins", "list").subnode(0, "map")
-    angle = plugin.with_location('model "M"', 'plugin "P"').subnode("angle", "map")
-    angle.get("min", "float")
-    assert failure(angle.ensure_accessed_all) == (
-        'Flatland YAML: Entry "angle" contains unrecognized entry(s) {"mix"} '
-        f'(in model "m" plugin "p") [{file}:4]'
-    )
-
-
 def test_only_maps_have_unknown_keys() -> None:
     for text in ("[1, 2]", "x", ""):
         assert read(text).ensure_accessed_all() is None
@@ -386,15 +375,6 @@ def test_defaults_of_missing_or_empty_entries(text: str) -> None:
             'Flatland YAML: Entry "y" does not exist (in "x") [line 1]'
         )
     reader.ensure_accessed_all()
-
-
-def test_an_optional_entry_must_be_valid_if_present() -> None:
-    reader = read("a: x\nb: {}\n")
-    assert '"a" must be a map' in failure(reader.optional_subnode, "a", "map")
-    assert '"b" must be a list' in failure(reader.optional_subnode, "b", "list")
-    assert 'entry "a" to float' in failure(reader.get, "a", "float", 1.0)
-    assert '"b" must be a list' in failure(reader.get_list, "b", "float", [])
-    assert reader.optional_subnode("b", "map").is_map
 
 
 def test_an_empty_text_is_null() -> None:

@@ -1,4 +1,4 @@
-"""Model files: all entries and error messages."""
+"""Model files: all entries, and errors that are collected."""
 
 from __future__ import annotations
 

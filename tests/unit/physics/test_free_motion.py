@@ -19,7 +19,7 @@ from flatland.physics import PhysicsBody, PhysicsWorld
 # `make fuzz` compares the results of this number of other worlds.
 EXAMPLES = int(os.environ.get("FLATLAND_FUZZ", "0"))
 PROPERTY = settings(
-    max_examples=EXAMPLES or 30,
+    max_examples=EXAMPLES or 15,
     deadline=None,
     derandomize=not EXAMPLES,
     suppress_health_check=list(HealthCheck),

@@ -23,7 +23,7 @@ Bits = npt.NDArray[np.bool_]
 
 masks = arrays(np.bool_, st.tuples(st.integers(1, 20), st.integers(1, 20)))
 runs = st.tuples(st.integers(-4, 4), st.integers(-4, 4), st.integers(0, 6))
-FEW = settings(max_examples=50)
+FEW = settings(max_examples=25)
 
 
 @FEW

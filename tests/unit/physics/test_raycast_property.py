@@ -28,7 +28,7 @@ EdgeMaker = Callable[[np.random.Generator, int], FloatArray]
 # A failure prints a blob that reproduces it. A blob is valid for one version of hypothesis only, so
 # add the scene to test_raycast.py as a separate test.
 PROPERTY = settings(
-    max_examples=40,
+    max_examples=20,
     deadline=None,
     print_blob=True,
     suppress_health_check=list(HealthCheck),

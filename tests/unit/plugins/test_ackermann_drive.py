@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
-import sys
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -193,45 +190,6 @@ class TestAckermannCommand:
         world.command("/ackermann_cmd").set(AckermannCommand(speed=math.nan))
         world.step()
         assert plugin(world).speed == 1.0
-
-    @pytest.mark.parametrize("is_installed", [True, False])
-    def test_with_ros_the_messages_must_be_installed(
-        self, car: Any, monkeypatch: pytest.MonkeyPatch, is_installed: bool
-    ) -> None:
-        class Bridge(flatland.WorldObserver):
-            def plugin_ros(self, plugin: Any) -> Any:
-                return SimpleNamespace(close=lambda: None)
-
-        find_spec = importlib.util.find_spec
-        monkeypatch.setattr(
-            importlib.util,
-            "find_spec",
-            lambda name: is_installed or None if name == "ackermann_msgs" else find_spec(name),
-        )
-        if is_installed:
-            assert car("command: ackermann", observers=[Bridge()]).command("/ackermann_cmd")
-        else:
-            with pytest.raises(flatland.PluginError, match="requires the ROS package"):
-                car("command: ackermann", observers=[Bridge()])
-
-    def test_message(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        """The adapter converts a message of the package, which need not be installed."""
-        pytest.importorskip("rospy")
-        package, module = ModuleType("ackermann_msgs"), ModuleType("ackermann_msgs.msg")
-        module.AckermannDriveStamped = type("AckermannDriveStamped", (), {})
-        monkeypatch.setitem(sys.modules, "ackermann_msgs", package)
-        monkeypatch.setitem(sys.modules, "ackermann_msgs.msg", module)
-        from flatland.ros import adapters
-
-        monkeypatch.setattr(adapters._adapters, "_adapters", {})
-        adapter = adapters.find_adapter(AckermannCommand)
-        assert adapter is not None
-        assert adapter.from_message is not None
-        fields = SimpleNamespace(
-            steering_angle=0.1, steering_angle_velocity=0.2, speed=3.0, acceleration=4.0, jerk=5.0
-        )
-        found = adapter.from_message(SimpleNamespace(drive=fields))
-        assert found == AckermannCommand(0.1, 0.2, 3.0, 4.0)
 
 
 def test_odometry_and_twist(car: Any) -> None:

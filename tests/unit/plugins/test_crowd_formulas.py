@@ -74,7 +74,7 @@ def test_discs_that_stand_apart_need_no_change() -> None:
 
 def test_the_nearest_point_of_half_planes_is_that_of_an_exhaustive_search() -> None:
     rng = np.random.default_rng(4)
-    grid = np.stack(np.meshgrid(*[np.linspace(-1, 1, 401)] * 2), axis=-1).reshape(-1, 2)
+    grid = np.stack(np.meshgrid(*[np.linspace(-1, 1, 101)] * 2), axis=-1).reshape(-1, 2)
     grid = grid[np.hypot(*grid.T) <= 1.0]
     feasible = 0
     for _ in range(60):

@@ -65,7 +65,7 @@ class TestDrift:
     ) -> None:
         world = robot(DRIFT)
         truths, odometry = collect(world, TRUTH), collect(world, ODOMETRY)
-        world.step(2000)
+        world.step(1000)
         assert odometry[0].pose == truths[0].pose == pytest.approx(START)
         exact, measured = np.array(poses(truths)), np.array(poses(odometry))
         assert math.dist(exact[-1][:2], measured[-1][:2]) > 0.1
@@ -105,8 +105,8 @@ class TestDrift:
     def test_white_noise_is_added_to_the_drifting_pose(self, robot: Load, collect: Collect) -> None:
         drifting, noisy = robot(DRIFT), robot(f"{DRIFT}, odom_pose_noise: [0.04, 0.09, 0.16]")
         exact, measured = collect(drifting, ODOMETRY), collect(noisy, ODOMETRY)
-        drifting.step(2000)
-        noisy.step(2000)
+        drifting.step(1000)
+        noisy.step(1000)
         noise = np.array(poses(measured)) - poses(exact)
         assert noise.std(axis=0) == pytest.approx([0.2, 0.3, 0.4], rel=0.08)
         assert abs(np.corrcoef(noise[1:, 0], noise[:-1, 0])[0, 1]) < 0.1
@@ -172,7 +172,7 @@ def test_the_twist_topic_has_the_errors_of_the_odometry(
     assert twists[-1].covariance == pytest.approx(odometry[-1].twist_covariance)
 
 
-@pytest.mark.parametrize("extra", ["", DRIFT, f"{DRIFT}, after_step: true", "after_step: true"])
+@pytest.mark.parametrize("extra", ["", f"{DRIFT}, after_step: true"])
 class TestMovedModel:
     FAR = (-7.0, 4.0, 2.5)
 

@@ -384,7 +384,7 @@ def test_failed_requests_change_nothing(files: WorldFiles) -> None:
     before = world.state_hash()
     for request, text in (
         (lambda: people.spawn("x"), 'group "x" does not exist; groups: a, b, c'),
-        (lambda: people.spawn("a", 5000), "free places"),
+        (lambda: people.spawn("a", 1000), "free places"),
         (lambda: people.remove(["a_0", "nobody"]), 'there is no person "nobody"'),
         (lambda: people.send(["a_0"], (100.0, 100.0)), "there is no way for"),
         (lambda: people.spawn("a", poses=[(2, 2, 0), (math.nan, 0, 0)]), "finite"),

@@ -140,25 +140,6 @@ def test_a_move_does_not_turn_the_wheels(plugin_world: Any) -> None:
     assert wheels(world).angles == pytest.approx((5.0, 5.0), abs=2e-3)
 
 
-def test_message() -> None:
-    pytest.importorskip("rospy")
-    from io import BytesIO
-
-    from flatland.ros.adapters import find_adapter
-
-    value = flatland.JointState(1_500_000_000, ("left", "right"), (1.0, -2.5), (0.25, 3.0))
-    adapter = find_adapter(flatland.JointState)
-    assert adapter is not None
-    assert adapter.to_message is not None
-    assert adapter.serialize is not None
-    message = adapter.to_message(value)
-    assert (message.header.stamp.secs, message.header.stamp.nsecs) == (1, 500_000_000)
-    assert (message.name, message.position) == (["left", "right"], (1.0, -2.5))
-    buffer = BytesIO()
-    message.serialize(buffer)
-    assert adapter.serialize(value) == buffer.getvalue()
-
-
 @pytest.mark.parametrize(
     ("wheels", "message"),
     [

@@ -24,18 +24,6 @@ def test_an_unknown_policy_raises() -> None:
         Faults(wrong)
 
 
-def test_a_successful_call_resets_the_count_of_faults() -> None:
-    faults = Faults("disable")
-    for _ in range(5):
-        assert not take(faults)
-        assert not take(faults)
-        assert not take(faults, hook="other")
-        assert faults.counts
-        faults.succeeded("p", "hook")
-        faults.succeeded("p", "other")
-    assert not faults.counts
-
-
 def test_the_log_has_one_traceback_per_second_and_source(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

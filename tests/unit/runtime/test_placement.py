@@ -469,7 +469,7 @@ def test_samples_in_the_office_are_all_in_rooms(checkout: Path) -> None:
         assert (poses[:, :2] > low + 0.35 - 1e-4).all()
         assert (poses[:, :2] < high - 0.35 + 1e-4).all()
         assert world.is_free(poses[0], radius=0.25)
-        everywhere = world.sample_free(400, 0.05, rng=2)
-        reached = world.sample_free(400, 0.05, rng=2, connected_to=(x, y))
+        everywhere = world.sample_free(200, 0.05, rng=2)
+        reached = world.sample_free(200, 0.05, rng=2, connected_to=(x, y))
         # Without `connected_to`, places within thick walls and shafts are drawn too.
         assert not np.array_equal(everywhere, reached)

@@ -87,7 +87,7 @@ def test_requests_are_carried_out_while_another_thread_steps(files: Any) -> None
 
     with ThreadPoolExecutor(5) as pool:
         steps = pool.submit(step)
-        reads = [pool.submit(world.between_steps, threading.get_ident) for _ in range(500)]
+        reads = [pool.submit(world.between_steps, threading.get_ident) for _ in range(200)]
         for read in reads:
             read.result(TIMEOUT)
         ended.set()
