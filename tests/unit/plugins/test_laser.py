@@ -224,6 +224,11 @@ class TestTimes:
 
 
 class TestNoise:
+    @pytest.mark.parametrize(("no_hit", "value"), [("nan", math.nan), ("range", 20.0)])
+    def test_misses_have_no_noise(self, walls: Walls, no_hit: str, value: float) -> None:
+        world = walls.load(laser(f"noise_std_dev: 0.2, no_hit: {no_hit}"))
+        np.testing.assert_array_equal(eye(world).compute_ranges(), np.full(4, value, np.float32))
+
     def test_the_number_of_calls_is_part_of_the_state(self, walls: Walls) -> None:
         world = walls.room("noise_std_dev: 0.2")
         before = world.state_hash()

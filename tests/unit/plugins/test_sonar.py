@@ -192,6 +192,8 @@ def test_readings_do_not_depend_on_subscribers_and_repeat_after_a_restore(
             'Invalid "smallest_object", more than 1000000 rays would be needed to find it in the '
             "whole cone, got 1e-06",
         ),
+        (", no_hit: zero", 'Invalid "no_hit", must be one of: nan, inf, range, got zero'),
+        (", layers: [4d]", "Cannot find layer(s): {4d}"),
     ],
 )
 def test_invalid_parameters(plugin_world: Any, more: str, message: str) -> None:
