@@ -13,8 +13,8 @@ _CATKIN: Final = "catkin.find_in_workspaces"
 def defer_catkin() -> None:
     """Defers an import of roslib, and thereby of rospy, to the first search of a catkin workspace.
 
-    The module is imported for a single function. Together with the parser that it imports, it takes
-    a seventh of the time of rospy. Must be called before the import of rospy.
+    The module is imported for a single function, and imports a parser, which takes longer than most
+    modules of rospy. Must be called before the import of rospy.
     """
     if _CATKIN in sys.modules:
         return

@@ -64,6 +64,8 @@ class _Command(socketserver.BaseRequestHandler):
         try:
             run()
         except SystemExit as end:
+            if isinstance(end.code, str):
+                print(end.code, file=sys.stderr)
             code = end.code if isinstance(end.code, int) else int(end.code is not None)
         sys.stdout.flush()
         self.request.send(str(code).encode())

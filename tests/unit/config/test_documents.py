@@ -269,6 +269,16 @@ def test_supported_encodings(tmp_path: Path, encoding: str) -> None:
     assert node.text == "Rübe 🐢"
 
 
+def test_windows_line_endings(tmp_path: Path) -> None:
+    file = tmp_path / "w.yaml"
+    file.write_bytes(b"a: 1\r\nb: x\r\nc: \xff\r\n")
+    assert "line 3 col 4, byte 0xff is not valid UTF-8" in file_failure(file)
+    file.write_bytes(b"a: 1\r\nb: x\r\n")
+    (root,) = load_documents(str(file), Inputs())
+    assert isinstance(root, MapNode)
+    assert root.entries["b"].line == 2
+
+
 def file_failure(path: Path | str) -> str:
     with pytest.raises(YamlError) as caught:
         load_documents(str(path), Inputs())

@@ -153,6 +153,13 @@ def test_an_error_contains_the_expression_and_the_lua_message(
     assert message.endswith(f"{why} [{files.path('main')}:2]")
 
 
+def test_an_endless_expression_is_stopped(files: Files, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("flatland.config.lua.TIME_LIMIT", 0.05)
+    message = files.failure("a: 1\nx: $eval while true do end return 1\n")
+    assert 'Failed to evaluate "while true do end return 1", ' in message
+    assert message.endswith(f" [{files.path('main')}:2]")
+
+
 def test_long_expressions_and_messages_are_shortened(files: Files) -> None:
     message = files.failure(f"x: $eval {'y' * 1000}.z")
     assert f'Failed to evaluate "{"y" * 500}...", ' in message
@@ -372,6 +379,10 @@ def test_an_included_file_that_is_malformed_is_an_error(files: Files) -> None:
         f'Flatland YAML: Malformatted file, path="{files.path("part")}", line 3 col 1, '
         f"did not find expected node content [{files.path('main')}:2]"
     )
+
+
+def test_an_included_folder_is_an_error(files: Files) -> None:
+    assert "it is not a regular file" in files.failure("$include .")
 
 
 def test_a_lua_error_contains_the_position_in_the_included_file(files: Files) -> None:

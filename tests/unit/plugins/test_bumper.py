@@ -297,3 +297,8 @@ def test_contacts_between_other_models_are_ignored(plugin_world: Any, files: Any
     world.step()
     assert len(world.contacts) == 1
     assert output.latest.collisions == ()
+
+
+def test_an_illegal_topic_is_an_error(plugin_world: Any) -> None:
+    error = plugin_world.error("[{type: Bumper, name: bumper, topic: 'a b'}]")
+    assert 'Model Plugin "bumper" type "Bumper" model "robot": "a b" is not a legal topic' in error

@@ -302,7 +302,7 @@ class TestRandomStart:
         world = follow("waypoints: [[3, 0], [3, 2]], speed: 1, acceleration: 1, wait: 0.5")
 
         def places(steps: int) -> np.ndarray:
-            found = []
+            found = [pose(world)[:2]]
             for _ in range(steps):
                 world.step()
                 found.append(pose(world)[:2])
