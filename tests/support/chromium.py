@@ -381,7 +381,10 @@ class Chromium:
         """Waits for a complete download whose name matches a pattern, and returns its path."""
 
         def found() -> Path | None:
-            return next((path for path in self.downloads.glob(pattern)), None)
+            # The browser reserves the name with an empty file.
+            return next(
+                (path for path in self.downloads.glob(pattern) if path.stat().st_size), None
+            )
 
         return Path(wait_until(f"a download {pattern}", found))
 

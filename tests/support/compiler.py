@@ -1,7 +1,8 @@
 """C++ programs of the tests, compiled with a cache of what earlier runs have compiled.
 
-A compilation with the same input takes its result from build/ccache. ccache hashes the preprocessed
-source, the options and the compiler, and serves concurrent runs. Without ccache, nothing is reused.
+A compilation with the same input takes its result from the cache of the user, also in another
+clone. ccache hashes the preprocessed source, the options and the compiler, and serves concurrent
+runs. Without ccache, nothing is reused.
 """
 
 from __future__ import annotations
@@ -15,7 +16,10 @@ from typing import Final
 from programs import run_program
 from waiting import BUILD_TIMEOUT
 
-_CACHE: Final = Path(__file__).resolve().parents[2] / "build" / "ccache"
+# As ccache chooses it.
+_CACHE: Final = os.environ.get("CCACHE_DIR") or str(
+    Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ccache"
+)
 _COMPILERS: Final = "/usr/lib/ccache"  # of Debian: programs of the names of the compilers
 
 
@@ -29,10 +33,9 @@ def caching(environment: Mapping[str, str], base: Path) -> dict[str, str]:
     return {
         **environment,
         "PATH": f"{_COMPILERS}:{environment['PATH']}",
-        "CCACHE_DIR": str(_CACHE),
+        "CCACHE_DIR": _CACHE,
         "CCACHE_BASEDIR": str(base),
         "CCACHE_NOHASHDIR": "1",
-        "CCACHE_MAXSIZE": "500M",
     }
 
 
