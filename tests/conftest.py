@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import gc
 import os
+import signal
 import sys
 from collections import Counter
 from collections.abc import Iterable
@@ -17,6 +18,11 @@ os.environ["HYPOTHESIS_NO_PLUGINS"] = "1"
 
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
+
+# A shell starts programs in the background with SIGINT ignored, which those that the tests start and
+# end with it would inherit.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Each process of pytest-xdist imports all modules of the tests, most of which time it would spend
 # with their compilation. The processes share what each of them has compiled.
