@@ -19,8 +19,8 @@ os.environ["HYPOTHESIS_NO_PLUGINS"] = "1"
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 
-# A shell starts programs in the background with SIGINT ignored, which those that the tests start and
-# end with it would inherit.
+# A shell starts programs in the background with SIGINT ignored, which the programs that the tests
+# start, and end with SIGINT, would inherit.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 

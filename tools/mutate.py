@@ -67,6 +67,7 @@ _ROOMS = {
             "tests/unit/plugin_api/test_missing_plugins.py",
             "tests/unit/bad_input",
             "tests/unit/cli/test_check_mistakes.py",
+            "tests/unit/recording",
         ),
     ),
     "node": Room(
@@ -106,6 +107,7 @@ _ROOMS = {
             "tests/unit/plugins/test_laser_noise.py",
             "tests/unit/plugins/test_force_mode.py",
             "tests/unit/plugins/test_moving_worlds.py",
+            "tests/unit/plugins",
         ),
     ),
     "rays": Room(
@@ -147,7 +149,6 @@ _ROOMS = {
             "tests/ros/test_wall_time.py",
         ),
     ),
-    # Without tests that take long; each still serves for the file that it mirrors.
     "runtime": Room(
         ("flatland/runtime/*.py",),
         (
@@ -167,6 +168,8 @@ _ROOMS = {
             "tests/unit/test_sensors_world.py",
             "tests/unit/plugins/test_laser_batch.py",
             "tests/unit/gym/test_batch.py",
+            "tests/unit/plugin_api/test_missing_plugins.py",
+            "tests/unit/runtime",
         ),
     ),
     "world": Room(

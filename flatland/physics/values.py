@@ -232,7 +232,7 @@ class Member(NamedTuple):
     speed: float
     is_aware: bool
     phase: float
-    is_redrawn: bool = False
+    is_redrawn: bool
 
 
 class PersonState(NamedTuple):

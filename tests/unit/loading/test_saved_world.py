@@ -68,6 +68,20 @@ def test_a_saved_world_has_the_same_models_at_the_same_poses(world: World, files
         assert [plugin.name for plugin in again.plugins] == ["w"]
 
 
+def test_a_saved_world_is_as_readable_as_its_source(files: Any) -> None:
+    files.write_map("room", ["####", "#..#", "####"])
+    world = files.load(
+        "properties: {velocity_iterations: 7}\n"
+        "layers:\n"
+        "  - {name: a, map: room.yaml, color: &red [1, 0, 0, 1]}\n"
+        "  - {name: b, map: room.yaml, color: *red}\n"
+        "models: []\n"
+    )
+    text, _ = SavedWorld(world).file()
+    assert "{velocity_iterations: 7}" in text
+    assert text.count("[1, 0, 0, 1]") == 2
+
+
 def test_a_saved_world_has_the_present_maps(world: World, files: Any) -> None:
     files.write_map("hall", ["######", "#....#", "######"])
     world.set_layer_map("other", "hall.yaml")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import flatland
@@ -89,6 +90,41 @@ def test_a_model_that_was_read_ahead_is_spawned_without_its_files(folder: Path) 
             world.spawn_model("m.yaml", "second")
 
 
+def test_a_file_that_includes_itself_is_read_ahead_once(folder: Path) -> None:
+    (folder / "m.yaml").write_text("bodies: $include m.yaml\n")
+    with flatland.World.from_yaml(folder / "world.yaml") as world:
+        store = world.source.read_models_ahead(["m.yaml"])
+        assert list(store.documents) == [str(folder / "m.yaml")]
+
+
+def test_at_most_1000_files_are_read_ahead(folder: Path) -> None:
+    with flatland.World.from_yaml(folder / "world.yaml") as world:
+        texts = [f"{{bodies: [], number: {number}}}" for number in range(1002)]
+        assert len(world.source.read_models_ahead(texts).documents) == 1000
+
+
+def test_the_file_of_several_models_of_a_request_is_read_once(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folder / "shape.yaml").write_text("{type: circle, radius: 0.1, density: 1}\n")
+    reads = []
+    read = WorldSource.read
+
+    def record(source: WorldSource, path: str) -> object:
+        reads.append(path)
+        return read(source, path)
+
+    with flatland.World.from_yaml(folder / "world.yaml") as world:
+        monkeypatch.setattr(WorldSource, "read", record)
+        world.spawn_models([flatland.ModelSpec("m.yaml", name) for name in ("a", "b", "c")])
+        assert reads == [str(folder / "m.yaml")]
+        # Values of expressions may differ from model to model.
+        (folder / "shape.yaml").write_text(SHAPE)
+        reads.clear()
+        world.spawn_models([flatland.ModelSpec("m.yaml", name) for name in ("d", "e")])
+        assert reads == [str(folder / "m.yaml")] * 2
+
+
 @pytest.mark.parametrize("text", ["bodies: [", "bodies: $include missing.yaml", "{}"])
 def test_errors_are_those_of_a_spawn_that_reads_itself(folder: Path, text: str) -> None:
     (folder / "m.yaml").write_text(text)
@@ -131,3 +167,18 @@ def test_a_map_that_was_read_ahead_replaces_a_map_without_its_files(
             world.set_layer_map("2d", "map.yaml")
         assert world.layer("2d").edges.tolist() == [[0, 0, 1, 0]]
         assert caplog.text.count("1 edges from") == 1
+
+
+def test_a_grid_that_was_converted_ahead_is_not_converted_again(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cells = np.zeros((4, 4), np.int8)
+    cells[1, 1] = 100
+    grid = flatland.OccupancyGrid((0.0, 0.0, 0.0), 0.5, cells)
+    with flatland.World.from_yaml(folder / "world.yaml") as world:
+        store = world.source.convert_grid_ahead(grid)
+        expected = world.source.grid_map(grid).edges
+        assert len(expected) > 0
+        monkeypatch.setattr("flatland.loading.world_source.grid_map", None)
+        with world.source.inputs.using(store):
+            np.testing.assert_array_equal(world.source.grid_map(grid).edges, expected)

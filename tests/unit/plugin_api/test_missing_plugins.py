@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
+from flatland_command import main
 
 import flatland
 from flatland import PluginError
@@ -133,6 +134,17 @@ def test_spawning_reports_all_missing_plugins_of_a_model_and_starts_none(files, 
     assert f"[{path}:4]" in message
     assert f"[{path}:6]" in message
     assert (empty_world.models, empty_world.ports.commands) == ([], {})
+
+
+def test_the_other_plugins_of_a_checked_model_are_checked_as_well(files, capsys):
+    path = write_model(
+        files, "m.yaml", "name: a, type: Aaa", "name: t, type: Tween, body: base, easing: fast"
+    )
+    assert main("check", path) == 1
+    output = capsys.readouterr().out
+    assert 'm.yaml:3: error: Model Plugin "a" type "Aaa"' in output
+    assert "Easing fast does not exist" in output
+    assert "m.yaml: 2 errors" in output
 
 
 def test_one_missing_plugin_is_reported_in_one_line(files, empty_world):

@@ -206,24 +206,28 @@ def test_odometry_and_twist(car: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "moved", "message"),
+    ("key", "moved", "message"),
     [
-        ("command: drive", {}, "must be one of: twist, steering, ackermann, got drive"),
-        ("", {"fr": (2.4, -0.8)}, "The wheels of the front axle must have the same x"),
-        ("", {"rl": (0.5, -0.9)}, "The left wheel of the rear axle must have a greater y"),
-        ("", {"rl": (0.5, 0.9)}, "The centres of both axles must have the same y"),
-        ("", {"rl": (3, 0.8), "rr": (3, -0.8)}, "The front axle must have a greater x"),
+        ("command", {}, "must be one of: twist, steering, ackermann, got drive"),
+        ("front_right", {"fr": (2.4, -0.8)}, "The wheels of the front axle must have the same x"),
+        ("rear_left", {"rl": (0.5, -0.9)}, "The left wheel of the rear axle must have a greater y"),
+        ("front_left", {"rl": (0.5, 0.9)}, "The centres of both axles must have the same y"),
+        ("front_left", {"rl": (3, 0.8), "rr": (3, -0.8)}, "The front axle must have a greater x"),
     ],
 )
-def test_errors(plugin_world: Any, text: str, moved: Any, message: str) -> None:
+def test_errors(plugin_world: Any, key: str, moved: Any, message: str) -> None:
     bodies = BODIES
     for name, (x, y) in moved.items():
         bodies = bodies.replace(
             f"name: {name}, pose: {[*ANCHORS[name], 0]}", f"name: {name}, pose: {[x, y, 0]}"
         )
-    error = plugin_world.error(drive(text), bodies=bodies, joints=joints(**moved))
+    # Each parameter on a line of its own.
+    text = drive("command: drive" if key == "command" else "").replace(", ", ",\n  ")
+    error = plugin_world.error(text, bodies=bodies, joints=joints(**moved))
     assert message in error
-    assert "robot.model.yaml" in error
+    lines = (plugin_world.files.folder / "robot.model.yaml").read_text().splitlines()
+    (number,) = (number for number, line in enumerate(lines, 1) if line.strip().startswith(key))
+    assert f"robot.model.yaml:{number}]" in error
 
 
 @pytest.mark.parametrize(

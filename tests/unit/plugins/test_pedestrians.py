@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rooms_with_people import CALM, DOOR, ONE, ROOM, SHELF, load, people_of
 
-from flatland.errors import WorldError
+from flatland.errors import PluginError, WorldError
 from tests.unit.conftest import WorldFiles
 
 
@@ -136,6 +136,20 @@ def test_those_who_wander_turn_away_from_a_closed_door(files: WorldFiles, model:
             walked += np.hypot(*(people.people.poses[:, :2] - before).T)
     assert ((people.people.poses[:, 0] > 5.5) == sides).all()
     assert walked.min() > 3.0  # between the places on this side, although half are on the other one
+
+
+def test_those_who_wander_need_two_places_with_a_way_between_them(files: WorldFiles) -> None:
+    # Each of 100 rooms has space for one person, so that the places are in different ones.
+    lines = [f"{i} 0 {i} 10\n0 {i} 10 {i}\n" for i in range(11)]
+    files.write("rooms.lines", "".join(lines))
+    files.write(
+        "rooms.yaml", "{type: line_segments, data: rooms.lines, scale: 1, origin: [0, 0, 0]}\n"
+    )
+    with pytest.raises(PluginError, match="there are no two free places with a way between them"):
+        files.load(
+            "properties: {}\nlayers: [{name: 2d, map: rooms.yaml}]\nplugins: [{name: people,"
+            " type: Pedestrians, groups: [{name: a, count: 1, places: 2, radius: 0.4}]}]\n"
+        )
 
 
 def test_nobody_is_added_inside_of_furniture(files: WorldFiles) -> None:

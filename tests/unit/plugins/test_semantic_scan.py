@@ -162,6 +162,7 @@ def test_noise_does_not_depend_on_subscribers(scan_world: Any) -> None:
         world.step()
         ranges.append(output.latest.ranges)
     np.testing.assert_array_equal(*ranges)
+    assert ranges[0][1] != pytest.approx(0.7, abs=1e-4)  # as without noise
 
 
 def test_the_name_of_a_class_must_not_be_empty(plugin_world: Any) -> None:

@@ -76,6 +76,30 @@ def test_a_door_connects_the_rooms_if_the_disc_fits(door: float, is_open: bool) 
     assert (found[:, 0] > 5.3).any() == is_open
 
 
+def test_the_regions_of_two_rooms_and_of_the_surroundings() -> None:
+    # A wall at x = 4 separates a small room from a large one.
+    walls = np.array([*box(1, 2, 20, 12), (4.0, 2.0, 4.0, 12.0)])
+    free_space = space(walls, 0.3, bounds=(0.0, 1.0, 21.0, 13.0))
+    cells = free_space.largest_region()
+    x, y = free_space.places_in(cells, np.random.default_rng(1)).T
+    assert 4.3 <= x.min() < 4.5
+    assert 19.5 < x.max() <= 19.7
+    assert 2.3 <= y.min() < y.max() <= 11.7
+    left, right = (free_space.regions_at(x, 4.0) for x in (2.0, 8.0))
+    assert right == free_space.regions_of(cells)
+    assert left
+    assert not left & right
+    outside = free_space.regions_at(0.2, 4.0)
+    assert outside == free_space.regions_at(20.7, 12.8) == free_space.regions_at(-50.0, 100.0)
+    assert not outside & (left | right)
+
+
+def test_no_region_is_the_largest_one_if_the_disc_fits_nowhere() -> None:
+    free_space = space(np.array(box(1, 2, 2, 3)), 0.6, bounds=(1.0, 2.0, 2.0, 3.0))
+    assert free_space.largest_region().size == 0
+    assert free_space.regions_at(1.5, 2.5) == frozenset()
+
+
 def test_a_slanted_passage_connects() -> None:
     """A corridor at 30° that is 10 cm wider than the disc."""
     turn = math.radians(30)

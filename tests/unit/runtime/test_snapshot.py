@@ -537,6 +537,15 @@ def test_an_output_is_wanted_as_it_is_now_after_a_restore(files: Any) -> None:
     assert len(received) == 2 * count > 0
 
 
+def test_a_copied_subscription_wants_what_the_original_wants(small: World) -> None:
+    plugin = small.model("drift").plugins[0]
+    output = small.ports.find_output("/drift/scan")
+    for wants in (False, True):
+        output.subscribe(plugin.before_physics_step, wants=wants)
+        with small.clone() as clone:
+            assert output.wanted == clone.ports.find_output("/drift/scan").wanted == wants
+
+
 def test_plugins_of_third_parties_need_to_know_nothing(small: World, files: Any) -> None:
     files.write("everything.model.yaml", plugin_model("Everything"))
     small.spawn_model("everything.model.yaml", "one", pose=(2.0, 2.0, 0.0))
