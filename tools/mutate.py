@@ -68,6 +68,7 @@ _ROOMS = {
             "tests/unit/bad_input",
             "tests/unit/cli/test_check_mistakes.py",
             "tests/unit/recording",
+            "tests/unit/runtime/test_layer_set.py",
         ),
     ),
     "node": Room(
@@ -108,6 +109,8 @@ _ROOMS = {
             "tests/unit/plugins/test_force_mode.py",
             "tests/unit/plugins/test_moving_worlds.py",
             "tests/unit/plugins",
+            "tests/unit/bad_input",
+            "tests/unit/runtime/test_frame_senders.py",
         ),
     ),
     "rays": Room(
@@ -169,6 +172,8 @@ _ROOMS = {
             "tests/unit/plugins/test_laser_batch.py",
             "tests/unit/gym/test_batch.py",
             "tests/unit/plugin_api/test_missing_plugins.py",
+            "tests/unit/plugins/test_bumper.py",
+            "tests/unit/bad_input/test_inputs.py",
             "tests/unit/runtime",
         ),
     ),

@@ -213,6 +213,11 @@ def test_odometry_and_twist(car: Any) -> None:
         ("rear_left", {"rl": (0.5, -0.9)}, "The left wheel of the rear axle must have a greater y"),
         ("front_left", {"rl": (0.5, 0.9)}, "The centres of both axles must have the same y"),
         ("front_left", {"rl": (3, 0.8), "rr": (3, -0.8)}, "The front axle must have a greater x"),
+        (
+            "front_left",
+            {name: (2, y) for name, y in [("fl", 1), ("fr", -1), ("rl", 1), ("rr", -1)]},
+            "The front axle must have a greater x",
+        ),
     ],
 )
 def test_errors(plugin_world: Any, key: str, moved: Any, message: str) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -163,6 +165,32 @@ class TestChoice:
         with pytest.raises(flatland.WorldError, match=r"beyond the limit of 0\.200"):
             hitch(world).attach()
         assert world.physics.object_counts().joints == 0
+
+    def test_the_service_names_what_it_connected_or_released(self, tow: Any) -> None:
+        pytest.importorskip("std_srvs.srv", reason="ROS is not installed")
+        services: dict[str, Callable[[Any], Any]] = {}
+
+        class Bridge(flatland.WorldObserver):
+            def plugin_ros(self, plugin: Any) -> Any:
+                def advertise(name: str, _kind: object, serve: Callable[[Any], Any]) -> None:
+                    services[name] = serve
+
+                return SimpleNamespace(advertise_service=advertise, close=lambda: None)
+
+        world = tow(observers=[Bridge()])
+
+        def call(hitched: bool) -> tuple[bool, str]:
+            response = services["set_hitch"](SimpleNamespace(data=hitched))
+            return response.success, response.message
+
+        assert call(True) == (True, "hitched: trailer")
+        assert hitch(world).hitched is world.model("trailer")
+        assert call(False) == (True, "released: trailer")
+        assert call(False) == (True, "released: nothing")
+        world.delete_model("trailer")
+        is_done, text = call(True)
+        assert not is_done
+        assert "no model is within 0.1 m" in text
 
     def test_a_call_replaces_an_earlier_command(self, tow: Any) -> None:
         world = tow()

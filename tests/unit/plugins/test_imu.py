@@ -219,6 +219,18 @@ def test_noise_has_the_configured_variances(plugin_world: Any, collect: Collect)
     assert np.corrcoef(samples.T) == pytest.approx(np.eye(4), abs=0.1)
 
 
+def test_noise_does_not_depend_on_subscribers(plugin_world: Any, collect: Collect) -> None:
+    last = []
+    for steps in (0, 20):
+        world = plugin_world(imu("orientation_noise: [0, 0, 0.01]"))
+        world.step(steps)
+        messages = collect(world, "/imu/filtered")
+        world.step(40 - steps)
+        last.append((messages[-1].stamp, messages[-1].yaw))
+    assert last[0] == last[1]
+    assert last[0][1] != 0
+
+
 def test_default_covariances_have_the_variances(plugin_world: Any, collect: Collect) -> None:
     world = plugin_world(
         imu(

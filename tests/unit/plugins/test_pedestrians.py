@@ -219,6 +219,22 @@ def test_people_queue_and_are_served_one_by_one(files: WorldFiles) -> None:
     assert waiting >= 3
 
 
+@pytest.mark.parametrize("spacing", [0.7, 1.2])
+def test_the_distance_of_people_in_a_queue_is_its_spacing(
+    files: WorldFiles, spacing: float
+) -> None:
+    group = (
+        "[{name: a, count: 3, area: [1.5, 2, 4, 4], order: once, waypoints:"
+        f" [{{at: [8, 3], queue: true, spacing: {spacing}, wait: [50, 50]}}]}}]"
+    )
+    world = load(files, group, CALM)
+    world.step(4000)
+    people = people_of(world).people
+    assert people.standing.all()
+    along = np.sort(np.hypot(*(people.poses[:, :2] - (8.0, 3.0)).T))
+    assert np.diff(along) == pytest.approx([spacing] * 2, abs=0.15)
+
+
 def test_people_wait_at_waypoints_and_stop_on_the_way(files: WorldFiles) -> None:
     group = (
         "[{name: a, count: 8, stops: {every: 5, time: [2, 4]},"

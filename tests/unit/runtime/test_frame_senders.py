@@ -40,6 +40,19 @@ def test_a_drive_and_a_tf_publisher_of_one_model_conflict(files, empty_world, ca
     assert caplog.records[0].levelname == "WARNING"
 
 
+def test_bodies_of_two_models_with_the_same_frames_conflict(files, empty_world, caplog):
+    for name in ("a", "b"):
+        path = model(files, name, f"{{name: tf_{name}, type: ModelTfPublisher, reference: base}}")
+        text = files.folder / path
+        text.write_text(text.read_text().replace("name: base,", f"name: base_{name},"))
+        text.write_text(text.read_text().replace("reference: base", f"reference: base_{name}"))
+        empty_world.spawn_model(path, name)
+    empty_world.step()
+    (text,) = warnings(caplog)
+    assert 'TF frame "arm" has two parents, "base_a" from Model Plugin "tf_a"' in text
+    assert '("exclude: [arm]" of "tf_a" or "exclude: [arm]" of "tf_b")' in text
+
+
 def test_two_models_with_the_same_frames_conflict(files, empty_world, caplog):
     empty_world.spawn_model(model(files, "a", DRIVE), "a")
     empty_world.spawn_model(model(files, "b", TF), "b")

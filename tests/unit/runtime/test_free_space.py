@@ -69,6 +69,14 @@ def test_no_place_is_missed() -> None:
     assert (distance_to(walls, found) >= radius + clearance - slack).all()
 
 
+def test_walls_out_of_bounds_matter_within_the_clearance() -> None:
+    walls = np.array([(-0.5, -1.0, -0.5, 7.0)])
+    free_space = space(walls, 0.2, clearance=0.6)
+    cells = free_space.cells(None)
+    assert free_space.cell_at(0.05, 3.0) not in cells
+    assert free_space.cell_at(0.45, 3.0) in cells
+
+
 @pytest.mark.parametrize(("door", "is_open"), [(0.595, False), (0.68, True), (0.9, True)])
 def test_a_door_connects_the_rooms_if_the_disc_fits(door: float, is_open: bool) -> None:
     found = places(space(two_rooms(door), 0.3), (2.0, 3.0))

@@ -224,6 +224,23 @@ class TestRunsEqualSingleSteps:
             assert not thread.is_alive()
         assert [world.timekeeper.sim_time_ns for world in worlds] == [400 * 5_000_000] * 2
 
+    def test_an_interrupt_releases_all_worlds(self, files: Any) -> None:
+        worlds = [room(files, {"a": CART.format(drive="DiffDrive")}) for _ in range(3)]
+
+        def interrupt(_: object) -> None:
+            raise KeyboardInterrupt
+
+        end = worlds[1].output("/a/odometry/filtered").subscribe(interrupt)
+        # What was raised refers to all frames.
+        with pytest.raises(KeyboardInterrupt) as caught:
+            step_worlds(worlds, 100)
+        end()
+        thread = threading.Thread(target=lambda: step_worlds(worlds, 1), daemon=True)
+        thread.start()
+        thread.join(TIMEOUT)
+        assert not thread.is_alive()
+        del caught
+
 
 class TestUnwantedUpdates:
     def test_a_subclass_that_overrides_a_hook_is_called_in_each_step(self, files: Any) -> None:
