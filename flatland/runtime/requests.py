@@ -204,13 +204,10 @@ class Requests:
                 the next call.
         """
         with self.lock, self._as_action:
-            try:
-                for _ in range(len(self.actions)):
-                    # An action may process the queue itself, so it can be empty earlier.
-                    if self.actions:
-                        self.actions.popleft()()
-            finally:
-                self._waiting.notify()
+            for _ in range(len(self.actions)):
+                # An action may process the queue itself, so it can be empty earlier.
+                if self.actions:
+                    self.actions.popleft()()
 
     def change(self, action: Callable[[], R], what: str) -> R | None:
         """Runs a change of the world: now, or after the step if a hook requests it.
@@ -251,10 +248,7 @@ class Requests:
         if self._on_post is not None:
             self._on_post()
         with self._as_action:
-            try:
-                return action()
-            finally:
-                self._waiting.notify()
+            return action()
 
     def _is_idle(self) -> bool:
         """Returns whether `process_if_idle` would run actions."""
