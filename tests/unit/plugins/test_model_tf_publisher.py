@@ -8,6 +8,7 @@ import pytest
 
 import flatland
 from flatland.geometry import compose
+from flatland.plugins.model_tf_publisher import ModelTfPublisher
 
 BODIES = """
 - name: base
@@ -123,3 +124,30 @@ def test_transforms_that_nobody_wanted_are_those_of_the_last_update(tf: Any, ext
             del transforms
 
     assert transforms([]) == transforms([Listener()])
+
+
+def test_transforms_are_computed_only_while_an_observer_wants_them(
+    tf: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = []
+    publish = ModelTfPublisher._publish
+
+    def record(plugin: Any, timekeeper: Any) -> None:
+        calls.append(timekeeper.sim_time_ns)
+        publish(plugin, timekeeper)
+
+    class Observer(flatland.WorldObserver):
+        def transforms_sent(self, transforms: Any) -> None:
+            pass
+
+    monkeypatch.setattr(ModelTfPublisher, "_publish", record)
+    world = tf()
+    counts = []
+    observer = Observer()
+    for change in (world.step, world.add_observer, world.remove_observer, world.add_observer):
+        if change != world.step:
+            change(observer)
+        calls.clear()
+        world.step(50)
+        counts.append(len(calls))
+    assert counts == [1, 50, 0, 50]  # the first update is always called
