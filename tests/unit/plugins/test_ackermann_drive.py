@@ -172,6 +172,10 @@ class TestAckermannCommand:
         world.step(40)
         assert plugin(world).steering_angle == pytest.approx(0.5)
         assert plugin(world).speed == pytest.approx(0.5 + 2 * 0.2)
+        # Only the size of an acceleration counts.
+        world.command("/ackermann_cmd").set(AckermannCommand(0.5, 0.0, 1.5, -1.0))
+        world.step(40)
+        assert plugin(world).speed == pytest.approx(0.5 + 2 * 0.2 + 1 * 0.2)
 
     def test_commands_are_recorded(self, car: Any, tmp_path: Path) -> None:
         world = car("command: ackermann")

@@ -147,6 +147,7 @@ def test_a_move_does_not_turn_the_wheels(plugin_world: Any) -> None:
         ("wheels: [{name: a, radius: 1}, {name: a, radius: 1}]", 'name "a" exists twice'),
         ("wheels: [{name: a, radius: 1, roller_angle: 0}]", 'Invalid "roller_angle"'),
         ("wheels: [{name: a, radius: 1}], ticks_per_turn: -1", "ticks_per_turn"),
+        ("wheels: [{name: a, radius: 1, body: x}]", 'Body with name "x" does not exist'),
     ],
 )
 def test_errors(plugin_world: Any, wheels: str, message: str) -> None:
