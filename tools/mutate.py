@@ -69,6 +69,7 @@ _ROOMS = {
             "tests/unit/cli/test_check_mistakes.py",
             "tests/unit/recording",
             "tests/unit/runtime/test_layer_set.py",
+            "tests/unit/runtime/test_model_set.py",
         ),
     ),
     "node": Room(

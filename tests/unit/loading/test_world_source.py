@@ -103,28 +103,6 @@ def test_at_most_1000_files_are_read_ahead(folder: Path) -> None:
         assert len(world.source.read_models_ahead(texts).documents) == 1000
 
 
-def test_the_file_of_several_models_of_a_request_is_read_once(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (folder / "shape.yaml").write_text("{type: circle, radius: 0.1, density: 1}\n")
-    reads = []
-    read = WorldSource.read
-
-    def record(source: WorldSource, path: str) -> object:
-        reads.append(path)
-        return read(source, path)
-
-    with flatland.World.from_yaml(folder / "world.yaml") as world:
-        monkeypatch.setattr(WorldSource, "read", record)
-        world.spawn_models([flatland.ModelSpec("m.yaml", name) for name in ("a", "b", "c")])
-        assert reads == [str(folder / "m.yaml")]
-        # Values of expressions may differ from model to model.
-        (folder / "shape.yaml").write_text(SHAPE)
-        reads.clear()
-        world.spawn_models([flatland.ModelSpec("m.yaml", name) for name in ("d", "e")])
-        assert reads == [str(folder / "m.yaml")] * 2
-
-
 @pytest.mark.parametrize("text", ["bodies: [", "bodies: $include missing.yaml", "{}"])
 def test_errors_are_those_of_a_spawn_that_reads_itself(folder: Path, text: str) -> None:
     (folder / "m.yaml").write_text(text)

@@ -211,6 +211,8 @@ class TestMove:
         assert models[1].bodies[0].velocity == (0, 0, 0)
         assert log.events == ["moved m0", "moved m2"]
         assert boxes.move_models([]) == []
+        with pytest.raises(ValueError, match="if_blocked must be one of"):
+            boxes.move_models({}, if_blocked="maybe")
 
     def test_two_models_exchange_their_places(self, boxes: Any) -> None:
         first, second = boxes.model("m0").pose, boxes.model("m1").pose

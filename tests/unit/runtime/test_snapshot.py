@@ -18,6 +18,7 @@ from plugin_manifests import write_plugins
 
 import flatland
 from flatland import StaleHandleError, Twist, World, WorldError
+from flatland.runtime.plugin_costs import PluginCosts
 
 STEPS = 20
 MODELS = Path(__file__).resolve().parents[3] / "bench" / "all_plugins.model.yaml"
@@ -535,6 +536,17 @@ def test_an_output_is_wanted_as_it_is_now_after_a_restore(files: Any) -> None:
     world.restore(unwanted)
     world.step(20)
     assert len(received) == 2 * count > 0
+
+
+def test_the_time_of_plugins_is_that_of_the_original_only(small: World) -> None:
+    small.plugin_host.costs = costs = PluginCosts()
+    with small.clone() as clone:
+        clone.step(20)
+        assert clone.plugin_host.costs is None
+        assert costs.seconds == {}
+    small.step(20)
+    assert small.plugin_host.costs is costs
+    assert costs.seconds
 
 
 def test_a_copied_subscription_wants_what_the_original_wants(small: World) -> None:
