@@ -311,9 +311,6 @@ class Snapshots:
             copier.fill(part, copier.add(part, other))
         for part, other in zip(self._others, clone._others, strict=True):
             copier.add(part, other)
-        costs = self._host.costs
-        if costs is not None:
-            copier.add(costs, costs)
         try:
             copier.finish()
             for output in self._ports.outputs.values():
@@ -322,8 +319,6 @@ class Snapshots:
         except UncopyableError as error:
             raise self._located(error) from None
         clone._host.jobs.change()
-        if costs is not None:
-            clone._host.costs = None
 
     # -- errors ----------------------------------------------------------------------------
 
