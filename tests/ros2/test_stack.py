@@ -240,6 +240,26 @@ def processes_of(folder: Path) -> list[str]:
     return commands
 
 
+def error_of_a_started_node(drive: Drive, mode: str, text: str, **options: Any) -> tuple[str, int]:
+    """Gives a node that is never ready more and more time, until it has started.
+
+    Args:
+        drive: The fixture.
+        mode: Mode of the node.
+        text: What the error contains if the node has started.
+        options: Options of the run.
+
+    Returns:
+        The error, and the time for the start [s].
+    """
+    error, start_time = "", 2
+    while text not in error and start_time < 60:
+        start_time *= 2
+        (row,) = drive(mode, start_time=start_time, **options)
+        error = row["error"]
+    return error, start_time
+
+
 def test_a_launch_file_and_a_program_drive_to_all_goals(drive: Drive) -> None:
     rows = drive("stack.launch.xml mode:=drive", "leaves")
     for row in rows:
@@ -262,11 +282,7 @@ def test_stamped_commands(drive: Drive, folder: Path, launcher: Any) -> None:
     command = [Path(sys.executable).with_name("flatland"), "test", folder / "scenario.yaml"]
     options = ["--robot", robot, "--out", folder / "out", "--stamped-commands"]
     assert launcher.program(*command, *options).wait() == 0
-    error, start_time = "", 2
-    while "TwistStamped" not in error and start_time < 60:  # until the node has started by then
-        start_time *= 2
-        (row,) = drive("stamped", start_time=start_time)
-        error = row["error"]
+    error, start_time = error_of_a_started_node(drive, "stamped", "TwistStamped")
     assert f"not ready after {start_time} s: no node publishes /cmd_vel" in error
     assert "geometry_msgs/msg/TwistStamped" in error
 
@@ -310,11 +326,7 @@ def test_goals_are_sent_to_an_action(drive: Drive) -> None:
     # The measures are those until then.
     assert aborted["recoveries"] == 2
     assert 0 < aborted["time"] < 5
-    error, start_time = "", 2
-    while "the action" not in error and start_time < 60:  # until the node has started by then
-        start_time *= 2
-        (absent,) = drive("drive", goal_action="navigate_to_pose", start_time=start_time)
-        error = absent["error"]
+    error, _ = error_of_a_started_node(drive, "drive", "the action", goal_action="navigate_to_pose")
     assert "the action navigate_to_pose is not available" in error
 
 

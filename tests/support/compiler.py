@@ -16,7 +16,7 @@ from typing import Final
 from programs import run_program
 from waiting import BUILD_TIMEOUT
 
-# As ccache chooses it.
+# The default folder of ccache, given explicitly since the home of a test may be another one.
 _CACHE: Final = os.environ.get("CCACHE_DIR") or str(
     Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ccache"
 )

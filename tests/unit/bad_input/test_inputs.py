@@ -344,6 +344,16 @@ INPUTS: dict[str, Input] = {
         "child_frame_id: base",
         'Invalid "child_frame_id", only used with "message: odometry"',
     ),
+    "Dummy with another float": plugin(
+        "DummyModelPlugin",
+        "dummy_param_float: 0.5, dummy_param_string: dummy_test_123456, dummy_param_int: 123456",
+        'Invalid "dummy_param_float", must be 0.123456, got 0.5',
+    ),
+    "Dummy with another text": plugin(
+        "DummyModelPlugin",
+        "dummy_param_float: 0.123456, dummy_param_string: x, dummy_param_int: 123456",
+        'Invalid "dummy_param_string", must be dummy_test_123456, got x',
+    ),
     "Dummy with another number": plugin(
         "DummyModelPlugin",
         "dummy_param_float: 0.123456, dummy_param_string: dummy_test_123456, dummy_param_int: 7",
