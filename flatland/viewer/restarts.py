@@ -11,7 +11,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Final
 
 STOP_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
@@ -48,35 +48,31 @@ def run_with_restarts(run: Callable[[Callable[[], None]], int]) -> int:
         128 plus the number of the signal that ended it; 0 if it crashed after a stop signal or with
         restarts disabled.
     """
-    child = 0
     is_stopped = False
     disabled = mmap.mmap(-1, 1)  # shared with the child; not 0 if restarts are disabled
-
-    def forward(number: int, _frame: object) -> None:
-        nonlocal is_stopped
-        is_stopped = True
-        if child != 0:
-            with suppress(ProcessLookupError):  # The child has just ended.
-                os.kill(child, number)
-
     parent = os.getpid()
-    for number in STOP_SIGNALS:
-        signal.signal(number, forward)
+    # They remain blocked here: a handler in Python would run too late if the signal arrived just
+    # before `waitpid` blocks. The end of the child is a signal as well.
+    waited = {*STOP_SIGNALS, signal.SIGCHLD}
+    signal.pthread_sigmask(signal.SIG_BLOCK, waited)
     for start in range(1, _MAX_STARTS + 1):
-        with stop_signals_blocked():
-            if is_stopped:
-                return 0
-            sys.stdout.flush()
-            sys.stderr.flush()
-            child = os.fork()
-            if child == 0:
-                for number in STOP_SIGNALS:
-                    signal.signal(number, lambda *_: sys.exit(0))
-                _end_with(parent)
+        if signal.sigpending() & set(STOP_SIGNALS):
+            return 0
+        sys.stdout.flush()
+        sys.stderr.flush()
+        child = os.fork()
         if child == 0:
+            for number in STOP_SIGNALS:
+                signal.signal(number, lambda *_: sys.exit(0))
+            _end_with(parent)
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, waited)
             return run(lambda: disabled.__setitem__(0, 1))
-        _, status = os.waitpid(child, 0)
-        child = 0
+        while (ended := os.waitpid(child, os.WNOHANG))[0] == 0:
+            received = signal.sigwait(waited)
+            if received in STOP_SIGNALS:
+                is_stopped = True
+                os.kill(child, received)  # It exists until it has been waited for.
+        _, status = ended
         code = os.waitstatus_to_exitcode(status)
         if -code not in _CRASHES:
             break
