@@ -35,12 +35,12 @@ test: setup-dev  ## run all tests, in four processes: make test [ARGS="-k laser"
 	@. ./setup.bash && pytest $(PYTEST_OPTIONS) $(ARGS)
 
 # Ignored, although their tests have marks, because each process would import their modules.
-NOT_QUICK := ros web build js
+NOT_QUICK := ros web build js examples unit/cli unit/drawing unit/gym unit/scenarios unit/web unit/worldgen
 
 .PHONY: test-quick
-test-quick: setup-dev  ## run the tests that need no ROS master, browser, build or other programs: make test-quick [ARGS="-k laser"]
+test-quick: setup-dev  ## run the tests that need no ROS master, browser or build, without slow ones: make test-quick [ARGS="-k laser"]
 	@. ./setup.bash && pytest --numprocesses 3 --dist loadgroup $(NOT_QUICK:%=--ignore tests/%) \
-		-m "not ros and not web and not build and not programs" $(ARGS)
+		-m "not ros and not web and not build and not slow" $(ARGS)
 
 # Runs, and busy processes beside them.
 N := 20

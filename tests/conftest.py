@@ -57,19 +57,31 @@ settings.load_profile("flatland")
 
 _TESTS = Path(__file__).resolve().parent
 _CHECKOUT = _TESTS.parent
-# Tests that need a ROS master, a screen, a browser, a compiler or other programs, and take a while.
+# Tests that need a ROS master, a screen, a browser or a compiler, and those that the quick loop
+# omits: a quarter of the unit tests, which use two thirds of their time.
 _MARKED_PATHS = {
     "ros": "ros",
     "ros/viewer": "viewer",
     "build": "build",
     "web": "web",
-    "js": "programs",
-    "unit/bad_input/test_hostile_files.py": "programs",
-    "unit/cli/test_doctor.py": "programs",
-    "unit/cli/test_documentation.py": "programs",
-    "unit/cli/test_test.py": "programs",
-    "unit/scenarios/test_workers.py": "programs",
-    "unit/test_extras.py": "programs",
+    "js": "slow",
+    "examples": "slow",
+    "unit/bad_input/test_hostile_files.py": "slow",
+    "unit/cli": "slow",
+    "unit/drawing": "slow",
+    "unit/gym": "slow",
+    "unit/physics/test_copy.py": "slow",
+    "unit/plugin_api/test_odometry_drift.py": "slow",
+    "unit/runtime/test_snapshot.py": "slow",
+    "unit/scenarios": "slow",
+    "unit/test_architecture.py": "slow",
+    "unit/test_determinism.py": "slow",
+    "unit/test_documentation.py": "slow",
+    "unit/test_extras.py": "slow",
+    "unit/test_plugin_bench.py": "slow",
+    "unit/viewer/test_restarts.py": "slow",
+    "unit/web": "slow",
+    "unit/worldgen": "slow",
 }
 # Folders whose tests run in one process, since they share a workspace, a screen or a browser. The
 # tests of each other file run in one process.

@@ -227,6 +227,7 @@ print(peak() - before)
 """
 
 
+@pytest.mark.slow
 def test_memory_is_bounded(runtime: str) -> None:
     """Runs in a separate process: Lua can abort it if memory runs out outside a protected call."""
     folders = [str(Path(lua.__file__).parents[2]), os.environ.get("PYTHONPATH", "")]

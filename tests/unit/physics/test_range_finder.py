@@ -377,6 +377,7 @@ def digests() -> list[str]:
     return [*found, test_materials.digest(*test_materials.clutter(3, test_materials.any_material))]
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_instruction_set(monkeypatch: pytest.MonkeyPatch) -> None:
     """This process uses the widest instructions that the processor has."""
     monkeypatch.syspath_prepend(str(Path(__file__).parent))

@@ -234,6 +234,7 @@ def test_without_walls_all_cells_are_free() -> None:
     assert found.max(axis=0) == pytest.approx((10, 6), abs=0.05)
 
 
+@pytest.mark.slow
 def test_large_areas_have_larger_cells() -> None:
     free_space = space(np.array([(0.0, 0.0, 1e6, 1e6)]), 0.1, 0.0, (0.0, 0.0, 1e6, 1e6))
     assert 1e6 < len(free_space.cells(None)) <= 16_100_000
