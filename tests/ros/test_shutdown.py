@@ -39,9 +39,6 @@ class EndlessStep(flatland.WorldPlugin):
 
 class EndlessEnd(flatland.WorldPlugin):
     def on_shutdown(self):
-        self.wait()
-
-    def wait(self):
         threading.Event().wait()
 
 
@@ -159,12 +156,23 @@ def test_step_of_a_plugin_that_does_not_return_is_named(
     )
 
 
+def test_plugin_that_does_not_shut_down_is_named(
+    launcher: Any, ros: Any, world_with: Callable[[str], Path]
+) -> None:
+    # Until then, also a busy machine has arrived there.
+    process = launcher.server(world_with("EndlessEnd"), shutdown_timeout=4.0)
+    process.send(signal.SIGINT)
+    place = r'MainThread: World Plugin "slow" type "test::EndlessEnd": on_shutdown, '
+    assert_was_ended(process, ros, place, timeout="4")
+
+
 def test_thread_of_a_plugin_that_does_not_end_is_named(
     launcher: Any, ros: Any, world_with: Callable[[str], Path]
 ) -> None:
-    process = launcher.server(world_with("EndlessThread"), shutdown_timeout=0.5)
+    # Until then, also a busy machine has ended the other threads.
+    process = launcher.server(world_with("EndlessThread"), shutdown_timeout=4.0)
     process.send(signal.SIGINT)
-    assert_was_ended(process, ros, r"worker: .*threading.py:\d+ in wait$")
+    assert_was_ended(process, ros, r"worker: .*threading.py:\d+ in wait$", timeout="4")
 
 
 def map_of_noise(folder: Path, size: int) -> Path:
@@ -204,13 +212,13 @@ def test_stop_in_roslaunch_passes_the_time_limit(
     process = launcher.launch(
         "flatland",
         "server.launch",
-        f"world_path:={world_with('EndlessEnd')}",
+        f"world_path:={world_with('EndlessStep')}",
         "show_viz:=false",
         "shutdown_timeout:=0.25",
     )
-    process.wait_for_line("loaded")
+    process.wait_for_line("stepping")
     process.send(signal.SIGINT)
     process.wait_for_line(
-        r'\[FATAL\].*not stopped within 0.25 s.*EndlessEnd": on_shutdown, .* in wait > '
+        r'\[FATAL\].*not stopped within 0.25 s.*EndlessStep": before_physics_step, '
     )
     process.wait()

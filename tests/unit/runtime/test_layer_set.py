@@ -40,7 +40,8 @@ def folder(tmp_path: Path) -> Path:
         )
     (tmp_path / "robot.yaml").write_text(ROBOT)
     (tmp_path / "world.yaml").write_text(
-        "properties: {}\nlayers: [{name: [2d, low], map: room.yaml, color: [1, 0, 0, 1]}]\n"
+        "properties: {}\nlayers: [{name: [2d, low], map: room.yaml, color: [1, 0, 0, 1],\n"
+        "  material: {reflectance: 0.25}, class: building}]\n"
         "models: [{name: r, model: robot.yaml, pose: [1, 1, 0]}]\n"
     )
     (tmp_path / "waiting.yaml").write_text(
@@ -105,6 +106,25 @@ def test_a_grid_replaces_the_walls(world: Any) -> None:
     world.set_layer_map("2d", "room.yaml")
     assert world.layer("2d").grid is None
     assert ahead(world) == pytest.approx(4, abs=1e-5)
+
+
+def test_unknown_keys_are_those_of_the_new_map(world: Any, folder: Path) -> None:
+    with (folder / "hall.yaml").open("a") as file:
+        file.write("author: nobody\n")
+    world.set_layer_map("2d", "hall.yaml")
+    assert world.layer("2d").unknown_map_keys == ("author",)
+
+
+def test_the_appearance_of_the_walls_remains(world: Any) -> None:
+    def appearance() -> tuple[Any, ...]:
+        layer = world.layer("2d")
+        return layer.names, layer.color, layer.material, layer.class_name, layer.category_bits
+
+    before = appearance()
+    assert before[3] == "building"
+    for source in ("hall.yaml", box()):
+        world.set_layer_map("2d", source)
+        assert appearance() == before
 
 
 def test_a_grid_equals_the_map_file_of_its_image(world: Any, folder: Path) -> None:

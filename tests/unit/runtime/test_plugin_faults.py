@@ -483,6 +483,28 @@ def test_an_exception_of_a_with_block_is_not_replaced_by_one_of_a_plugin(files, 
     assert world.closed
 
 
+def test_connections_that_cannot_be_closed_are_logged(files, faults, caplog):
+    class Connections:
+        def close(self):
+            raise OSError("no route")
+
+    class Node(flatland.WorldObserver):
+        def plugin_ros(self, plugin):
+            return Connections()
+
+    robot(files, WITNESS)
+    world = files.load(
+        "properties: {}\nlayers: []\nmodels: [{name: r, model: robot.model.yaml}]",
+        observers=[Node()],
+    )
+    world.delete_model("r")
+    (record,) = caplog.records
+    assert "closing its ROS connections failed" in record.getMessage()
+    assert 'model "r"' in record.getMessage()
+    assert str(record.exc_info[1]) == "no route"
+    assert world.models == []
+
+
 def test_an_exception_of_a_subscriber_is_raised_by_step_and_not_blamed_on_the_plugin(files, faults):
     world = laser_world(files, plugin_errors="raise")
     output = world.output("/scan")

@@ -164,6 +164,8 @@ def test_different_values_have_different_hashes() -> None:
         b"",
         "0",
         b"0",
+        "Y",
+        b"S",
         (),
         ((),),
         {},

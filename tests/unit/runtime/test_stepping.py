@@ -68,10 +68,22 @@ plugins:
 WITNESS = "  - {type: 'test::ContactWitness', name: witness}\n"
 
 
+class OnDemand(flatland.ModelPlugin):
+    """Counts the calls of an update, whose output nothing wants."""
+
+    def on_initialize(self, config: Any) -> None:
+        self.count = 0
+        self.unwanted = (self.output("unwanted", float),)
+        self.update = self.on_update(self.add_one, outputs=self.unwanted)
+
+    def add_one(self, timekeeper: Any) -> None:
+        self.count += 1
+
+
 @pytest.fixture(autouse=True)
 def plugins(declare_plugins: Any) -> None:
     """Declares the plugins of this module."""
-    declare_plugins(PythonDrive, PythonTricycle, PythonTween, ContactWitness)
+    declare_plugins(PythonDrive, PythonTricycle, PythonTween, ContactWitness, OnDemand)
 
 
 def room(files: Any, models: dict[str, str], **options: Any) -> flatland.World:
@@ -599,6 +611,20 @@ def test_jobs_of_the_core_and_of_python_are_in_the_order_of_the_plugins(
     world.step(2)
     speed = 0.2 if last == "DiffDrive" else 0.1
     assert world.model("a").bodies[0].velocity[:2] == pytest.approx((speed, 0.0))
+
+
+def test_changed_outputs_of_an_update_apply_from_the_next_step_on(files: Any) -> None:
+    plugins = "plugins: [{type: 'test::OnDemand', name: counter}]"
+    world = room(files, {"a": f"bodies: [{{name: b, footprints: []}}]\n{plugins}"})
+    plugin = world.model("a").plugin("counter")
+    world.step(10)
+    assert plugin.count == 1  # The first update is always called.
+    plugin.update.outputs = None
+    world.step(10)
+    assert plugin.count == 11
+    plugin.update.outputs = plugin.unwanted
+    world.step(10)
+    assert plugin.count == 11
 
 
 def test_updates_and_controllers_are_declared_in_on_initialize(files: Any) -> None:
