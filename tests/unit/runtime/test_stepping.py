@@ -69,15 +69,19 @@ WITNESS = "  - {type: 'test::ContactWitness', name: witness}\n"
 
 
 class OnDemand(flatland.ModelPlugin):
-    """Counts the calls of an update, whose output nothing wants."""
+    """Records the calls of an update, whose output nothing wants."""
 
     def on_initialize(self, config: Any) -> None:
-        self.count = 0
+        self.calls: list[Any] = []
         self.unwanted = (self.output("unwanted", float),)
-        self.update = self.on_update(self.add_one, outputs=self.unwanted)
+        self.update = self.on_update(
+            lambda timekeeper: self.calls.append("update"),
+            outputs=self.unwanted,
+            skipped=lambda count, stamp, poses: self.calls.append(count),
+        )
 
-    def add_one(self, timekeeper: Any) -> None:
-        self.count += 1
+    def model_moved(self, previous: Any, keep_odometry: bool) -> None:
+        self.calls.append("moved")
 
 
 @pytest.fixture(autouse=True)
@@ -613,18 +617,34 @@ def test_jobs_of_the_core_and_of_python_are_in_the_order_of_the_plugins(
     assert world.model("a").bodies[0].velocity[:2] == pytest.approx((speed, 0.0))
 
 
-def test_changed_outputs_of_an_update_apply_from_the_next_step_on(files: Any) -> None:
+@pytest.fixture
+def on_demand(files: Any) -> Any:
+    """A plugin with an update, whose first call is over: it is made in any case."""
     plugins = "plugins: [{type: 'test::OnDemand', name: counter}]"
     world = room(files, {"a": f"bodies: [{{name: b, footprints: []}}]\n{plugins}"})
+    world.step()
     plugin = world.model("a").plugin("counter")
+    assert plugin.calls == ["update"]
+    plugin.calls.clear()
+    return plugin
+
+
+def test_changed_outputs_of_an_update_apply_from_the_next_step_on(on_demand: Any) -> None:
+    world = on_demand.world
     world.step(10)
-    assert plugin.count == 1  # The first update is always called.
-    plugin.update.outputs = None
+    on_demand.update.outputs = None
+    world.step(2)
+    on_demand.update.outputs = on_demand.unwanted
     world.step(10)
-    assert plugin.count == 11
-    plugin.update.outputs = plugin.unwanted
-    world.step(10)
-    assert plugin.count == 11
+    on_demand.update.outputs = None
+    world.step()
+    assert on_demand.calls == [10, "update", "update", 10, "update"]
+
+
+def test_skipped_updates_are_reported_before_a_model_is_moved(on_demand: Any) -> None:
+    on_demand.world.step(10)
+    on_demand.world.move_model("a", (1, 0, 0))
+    assert on_demand.calls == [10, "moved"]
 
 
 def test_updates_and_controllers_are_declared_in_on_initialize(files: Any) -> None:
