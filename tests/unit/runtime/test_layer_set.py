@@ -13,6 +13,7 @@ import pytest
 
 import flatland
 from flatland import OccupancyGrid
+from flatland.entities.layer import Layer
 from flatland.recording import Replay
 
 ROOM = "-5 -5 5 -5\n5 -5 5 5\n5 5 -5 5\n-5 5 -5 -5\n"
@@ -183,6 +184,20 @@ def test_a_failure_leaves_the_old_map(
         world.set_layer_map("2d", source)
     assert world.physics.object_counts == counts
     assert world.state_hash() == before
+    assert log.changed == []
+    assert ahead(world) == pytest.approx(4, abs=1e-5)
+
+
+def test_other_errors_are_raised_unchanged(
+    world: Any, log: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(layer: Any, edges: Any) -> None:
+        raise MemoryError
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Layer, "add_edges", fail)
+        with pytest.raises(MemoryError):
+            world.set_layer_map("2d", "hall.yaml")
     assert log.changed == []
     assert ahead(world) == pytest.approx(4, abs=1e-5)
 
