@@ -263,11 +263,12 @@ export async function eventually(condition) {
 
 let frames = [];
 
-/** Calls the functions that wait for the next frame. */
+/** Calls the functions that wait for the next frame, and returns their number. */
 export function nextFrame() {
   const waiting = frames;
   frames = [];
   for (const callback of waiting) callback();
+  return waiting.length;
 }
 
 /** Opens the page anew: a document from index.html, and a window. Returns the elements by id. */

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { openPage } from "./fake_page.js";
+import { nextFrame, openPage } from "./fake_page.js";
 import { createStage, poses, showRoom } from "./fake_server.js";
 
 function open(options) {
@@ -50,6 +50,22 @@ test("the view follows a model until the view is fitted or centred elsewhere", (
   stage.follow("robot");
   stage.fit();
   assert.deepEqual(views, ["robot", null, "robot", null]);
+});
+
+test("a frame is requested when something has changed, and only then", (t) => {
+  const { connection, stage } = open();
+  nextFrame();
+  const draw = t.mock.method(stage, "draw");
+  assert.equal(nextFrame(), 0, "nothing has changed");
+  connection.emit("data", poses({ 10: [3, 4, 0] }));
+  stage.moveView((camera) => camera.pan(20, 0));
+  assert.equal(nextFrame(), 1, "both changes are drawn together");
+  assert.equal(draw.mock.callCount(), 1);
+  stage.invalidate();
+  stage.resize();
+  nextFrame();
+  assert.equal(draw.mock.callCount(), 2, "drawn when the size has changed");
+  assert.equal(nextFrame(), 0);
 });
 
 test("the view glides to a new centre", (t) => {

@@ -49,7 +49,8 @@ export class Stage extends Emitter {
      * @type {WeakMap<Camera, {world: WorldState, key: string, bounds: import("./geometry.js").Bounds}>} */
     this.fitted = new WeakMap();
     this.dark = dark;
-    this.isDirty = true;
+    /** Whether a frame is to be drawn, which is then requested. */
+    this.isDirty = false;
     /** @type {Renderer | null} */
     this.renderer = null;
     /** @type {{from: number[], to: number[], start: number} | null} */
@@ -65,11 +66,6 @@ export class Stage extends Emitter {
     session.on("hello", () => this.renderer?.keepOnly(session.worlds.values()));
     session.on("current", () => this.invalidate());
     this.resize();
-    const loop = () => {
-      if (this.isDirty) this.draw();
-      window.requestAnimationFrame(loop);
-    };
-    window.requestAnimationFrame(loop);
   }
 
   /** Whether the browser supports WebGL 2. */
@@ -93,7 +89,12 @@ export class Stage extends Emitter {
 
   /** Draws a frame as soon as the browser shows one. */
   invalidate() {
+    if (this.isDirty) return;
     this.isDirty = true;
+    // Requested when needed: requests in each frame would keep the browser busy while nothing moves.
+    window.requestAnimationFrame(() => {
+      if (this.isDirty) this.draw();
+    });
   }
 
   resize() {
