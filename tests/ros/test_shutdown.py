@@ -159,7 +159,7 @@ def test_step_of_a_plugin_that_does_not_return_is_named(
 def test_plugin_that_does_not_shut_down_is_named(
     launcher: Any, ros: Any, world_with: Callable[[str], Path]
 ) -> None:
-    # Until then, also a busy machine has arrived there.
+    # Even a busy machine has called `on_shutdown` by then.
     process = launcher.server(world_with("EndlessEnd"), shutdown_timeout=4.0)
     process.send(signal.SIGINT)
     place = r'MainThread: World Plugin "slow" type "test::EndlessEnd": on_shutdown, '
@@ -169,7 +169,7 @@ def test_plugin_that_does_not_shut_down_is_named(
 def test_thread_of_a_plugin_that_does_not_end_is_named(
     launcher: Any, ros: Any, world_with: Callable[[str], Path]
 ) -> None:
-    # Until then, also a busy machine has ended the other threads.
+    # Even a busy machine has ended the main thread by then.
     process = launcher.server(world_with("EndlessThread"), shutdown_timeout=4.0)
     process.send(signal.SIGINT)
     assert_was_ended(process, ros, r"worker: .*threading.py:\d+ in wait$", timeout="4")

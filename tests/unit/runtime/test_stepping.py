@@ -619,7 +619,7 @@ def test_jobs_of_the_core_and_of_python_are_in_the_order_of_the_plugins(
 
 @pytest.fixture
 def on_demand(files: Any) -> Any:
-    """A plugin with an update, whose first call is over: it is made in any case."""
+    """A plugin whose update has been called once; the first call does not depend on demand."""
     plugins = "plugins: [{type: 'test::OnDemand', name: counter}]"
     world = room(files, {"a": f"bodies: [{{name: b, footprints: []}}]\n{plugins}"})
     world.step()
