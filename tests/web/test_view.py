@@ -112,7 +112,7 @@ def test_lasers_scan_only_for_visible_pages_that_show_scans(
     wait_until("the laser rests", lambda: not room.scans_wanted())
     page.show("scans", True)
     wait_until("the laser scans again", room.scans_wanted)
-    with page.browser.tab_in_front():
-        wait_until("the laser rests for a hidden tab", lambda: not room.scans_wanted())
-    wait_until("the laser scans for a visible tab", room.scans_wanted)
+    with page.browser.minimized():
+        wait_until("the laser rests for a hidden page", lambda: not room.scans_wanted())
+    wait_until("the laser scans for a visible page", room.scans_wanted)
     page.browser.until("flatland.state.worlds[0].time > arguments[0]", room.time())
