@@ -37,6 +37,7 @@ _FLAGS: Final = (
     "--disable-dev-shm-usage",  # /dev/shm of containers is small
     "--use-angle=swiftshader",  # OpenGL without a graphics card
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-watchdog",  # it ends the process that draws if other programs are busy
     "--disable-gpu-compositing",  # of the page around the canvas, which the processor draws faster
     "--hide-scrollbars",
     "--force-color-profile=srgb",
