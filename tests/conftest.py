@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import gc
 import os
 import signal
 import sys
+import uuid
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
@@ -170,7 +172,13 @@ def pytest_collection_finish() -> None:
 class Results:
     """Prints the slowest groups of tests, with their fixtures, and ends runs that would hang."""
 
-    def __init__(self) -> None:
+    def __init__(self, run_id: str) -> None:
+        """Creates the hooks.
+
+        Args:
+            run_id: Identifier of the run, which pytest-xdist passes to the programs of the tests.
+        """
+        self._run_id = run_id
         self._times: Counter[str] = Counter()
 
     @pytest.hookimpl(trylast=True)
@@ -193,11 +201,20 @@ class Results:
             for group, seconds in self._times.most_common(_LISTED_GROUPS):
                 terminalreporter.write_line(f"{seconds:7.1f} s  {group}")
 
+    def pytest_unconfigure(self) -> None:
+        """Ends the programs of a process that was ended within a test, which would run on."""
+        variable = f"PYTEST_XDIST_TESTRUNUID={self._run_id}".encode()
+        for path in Path("/proc").glob("[0-9]*/environ"):
+            with contextlib.suppress(OSError):  # it has ended, or belongs to another user
+                if variable in path.read_bytes().split(b"\0"):
+                    os.kill(int(path.parent.name), signal.SIGKILL)
+
 
 def pytest_configure(config: pytest.Config) -> None:
     """Adds the hooks of the process that prints the results."""
     if not hasattr(config, "workerinput"):
-        config.pluginmanager.register(Results())
+        config.option.testrunuid = config.getoption("testrunuid", None) or uuid.uuid4().hex
+        config.pluginmanager.register(Results(config.option.testrunuid))
 
 
 @pytest.fixture(scope="session")
