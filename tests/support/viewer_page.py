@@ -15,6 +15,7 @@ for (const menu of document.querySelectorAll("[popover]")) menu.hidePopover();
 for (const form of document.querySelectorAll("dialog form")) form.reset();
 const buttons = document.querySelectorAll("figure.plot button, #notices [aria-label=Dismiss]");
 for (const button of buttons) button.click();
+document.querySelector("#plot-series").value = "";
 if (!document.querySelector("#plots").hidden) document.querySelector("#plots-close").click();
 if (document.body.dataset.panel === "closed") document.querySelector("#panel-toggle").click();
 localStorage.clear();
