@@ -82,6 +82,13 @@ rm -rf flatland_msgs
     replace_file "$site/$file" "$file"
   done
 
+if [[ $level == dev ]]; then
+  echo "flatland: building the catkin workspace of the tests"
+  if ! flock build/.workspace.lock tools/catkin_workspace.sh >build/workspace.log 2>&1; then
+    echo "flatland: the catkin workspace could not be built (see build/workspace.log); its tests try again"
+  fi
+fi
+
 rm -f "$stamps/run" "$stamps/dev"
 echo "$content" >"$stamps/$level"
 echo "flatland: ready"

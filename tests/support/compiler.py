@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -21,22 +21,6 @@ _CACHE: Final = os.environ.get("CCACHE_DIR") or str(
     Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ccache"
 )
 _COMPILERS: Final = "/usr/lib/ccache"  # of Debian: programs of the names of the compilers
-
-
-def caching(environment: Mapping[str, str], base: Path) -> dict[str, str]:
-    """Returns an environment whose compilers use the cache.
-
-    Args:
-        environment: Variables, with `PATH`.
-        base: Folder that has another name in each run; paths below it are relative in the cache.
-    """
-    return {
-        **environment,
-        "PATH": f"{_COMPILERS}:{environment['PATH']}",
-        "CCACHE_DIR": _CACHE,
-        "CCACHE_BASEDIR": str(base),
-        "CCACHE_NOHASHDIR": "1",
-    }
 
 
 def compile_program(
@@ -53,7 +37,14 @@ def compile_program(
     Returns:
         The program.
     """
-    environment = caching(os.environ, program.parent)
+    environment = {
+        **os.environ,
+        "PATH": f"{_COMPILERS}:{os.environ['PATH']}",
+        "CCACHE_DIR": _CACHE,
+        # Another folder in each run; paths below it are relative in the cache.
+        "CCACHE_BASEDIR": str(program.parent),
+        "CCACHE_NOHASHDIR": "1",
+    }
     compiler = shutil.which(os.environ.get("CXX", "c++"), path=environment["PATH"])
     assert compiler is not None, "the build of flatland requires a C++ compiler"
     objects = []

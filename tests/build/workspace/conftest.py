@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from compiler import caching
 from programs import output_of
 from waiting import BUILD_TIMEOUT
 
@@ -39,30 +40,22 @@ class Space:
         return output_of(command, self.environment, self.scratch)
 
 
-@pytest.fixture(scope="session")
-def catkin_workspace(tmp_path_factory: pytest.TempPathFactory, checkout: Path) -> Path:
-    """A workspace with flatland, the example package and a client in src/, built and installed."""
+@pytest.fixture(scope="package")
+def catkin_workspace(checkout: Path) -> Iterator[Path]:
+    """A workspace with flatland, the example package and a client in src/, built and installed.
+
+    It is kept for the next run. No other run changes it before the tests of this folder end.
+    """
     if shutil.which("catkin_make", path="/usr/bin") is None:
         pytest.skip("catkin is not installed")
-    workspace = tmp_path_factory.mktemp("catkin") / "work space"
-    (workspace / "src").mkdir(parents=True)
-    (workspace / "src" / "flatland").symlink_to(checkout)
-    (workspace / "src" / "my_robots").symlink_to(checkout / "examples" / "my_robots")
-    (workspace / "src" / "a_client").symlink_to(Path(__file__).with_name("client"))
-    # For a short build: messages for C++ and Python only, and no optimization. The installation by
-    # pip tests the default.
-    languages = {"ROS_LANG_DISABLE": "geneus:genlisp:gennodejs"}
-    environment = caching(clean_environment(workspace) | languages, workspace)
-    fast = [
-        "-DCMAKE_BUILD_TYPE=RelWithDebInfo",
-        "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O0 -DNDEBUG",
-    ]
-    output_of(["catkin_make", "-j2", *fast], environment, workspace, silence=BUILD_TIMEOUT)
-    output_of(["catkin_make", "install", "-j2"], environment, workspace, silence=BUILD_TIMEOUT)
-    return workspace
+    with (checkout / "build" / ".workspace.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        build = checkout / "tools" / "catkin_workspace.sh"
+        output_of([build], dict(os.environ), checkout, silence=BUILD_TIMEOUT)
+        yield checkout / "build" / "work space"
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def make_space(
     catkin_workspace: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Callable[[str], Space]:
