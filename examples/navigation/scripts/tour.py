@@ -120,6 +120,7 @@ class Truth:
         self._waiting: deque[tuple[rospy.Time, Pose]] = deque()
         self._next_sample = rospy.Time()
         self._last: Pose | None = None
+        self._stamp = rospy.Time()
         self._path = 0.0
         self._errors = Errors()
         self._subscriber = rospy.Subscriber(topic, Odometry, self._receive, queue_size=100)
@@ -137,7 +138,13 @@ class Truth:
             self._waiting.clear()
 
     def stop(self) -> tuple[Pose, float, Errors]:
-        """Returns the true pose, and the length of the path and the errors since `start`."""
+        """Waits for a true pose that is not older than now.
+
+        Returns:
+            The pose, and the length of the path and the errors since `start`.
+        """
+        now = rospy.Time.now()
+        wait("true pose", lambda: self._stamp >= now, math.inf)
         with self._lock:
             if self._last is None:
                 raise TourError("no true pose")
@@ -155,6 +162,7 @@ class Truth:
             if self._last is not None:
                 self._path += math.hypot(pose[0] - self._last[0], pose[1] - self._last[1])
             self._last = pose
+            self._stamp = stamp
             if stamp >= self._next_sample:
                 self._next_sample = stamp + rospy.Duration(_SAMPLE_PERIOD)
                 self._waiting.append((stamp, pose))
