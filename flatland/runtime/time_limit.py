@@ -23,7 +23,8 @@ def call_with_limit(seconds: float | None, action: Callable[[], T]) -> T:
     """Returns the result of a function, which is interrupted if it takes too long.
 
     In the main thread, a signal (SIGALRM) interrupts Python code and system calls that wait, such
-    as `sleep`, a socket or a lock. The signal is repeated if the function catches the exception.
+    as `sleep`, a socket or a lock. The signal is repeated if the function catches the exception. An
+    alarm that the program has set is delayed until the function returns.
 
     Other threads receive no signals. There, a trace function compares the time with the limit
     before each line of Python code. Calls that wait are not interrupted, and neither is
@@ -53,6 +54,8 @@ def _call_with_signal(seconds: float, action: Callable[[], T]) -> T:
             raise TimeLimitExceeded
 
     previous = signal.signal(signal.SIGALRM, interrupt)
+    start = time.monotonic()
+    left, period = signal.getitimer(signal.ITIMER_REAL)
     try:
         try:
             signal.setitimer(signal.ITIMER_REAL, seconds, _RETRY_PERIOD)
@@ -63,6 +66,10 @@ def _call_with_signal(seconds: float, action: Callable[[], T]) -> T:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, previous)
+        if left:
+            overdue = 1e-6  # s; 0 would discard the alarm
+            left = max(left - (time.monotonic() - start), overdue)
+            signal.setitimer(signal.ITIMER_REAL, left, period)
 
 
 def _call_traced(seconds: float, action: Callable[[], T]) -> T:

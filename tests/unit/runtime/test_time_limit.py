@@ -7,11 +7,13 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from contextlib import nullcontext
 from types import FrameType
 
 import pytest
+from waiting import wait_until
 
 from flatland.runtime.time_limit import TimeLimitExceeded, call_with_limit
 
@@ -65,11 +67,45 @@ def limited(run: Callable[[], object]) -> None:
     ids=["loop", "stubborn loop", "socket", "sleep", "lock"],
 )
 def test_code_that_blocks_the_main_thread_is_interrupted(block: Callable[[], object]) -> None:
-    handler = signal.getsignal(signal.SIGALRM)
     with pytest.raises(TimeLimitExceeded):
         limited(block)
+
+
+@pytest.fixture
+def alarms() -> Iterator[list[int]]:
+    """The numbers of the alarms that this program has received; without that of pytest-timeout."""
+    received: list[int] = []
+    handler = signal.signal(signal.SIGALRM, lambda number, _frame: received.append(number))
+    timer = signal.setitimer(signal.ITIMER_REAL, 0)
+    yield received
+    signal.signal(signal.SIGALRM, handler)
+    signal.setitimer(signal.ITIMER_REAL, *timer)
+
+
+@pytest.mark.parametrize("run", [lambda: None, loop], ids=["in time", "too late"])
+@pytest.mark.parametrize("timer", [(0.0, 0.0), (1000.0, 7.0)], ids=["none", "later"])
+def test_the_alarm_of_the_program_is_restored(
+    alarms: list[int], timer: tuple[float, float], run: Callable[[], object]
+) -> None:
+    handler = signal.getsignal(signal.SIGALRM)
+    signal.setitimer(signal.ITIMER_REAL, *timer)
+    with pytest.raises(TimeLimitExceeded) if run is loop else nullcontext():
+        limited(run)
+    left, period = signal.getitimer(signal.ITIMER_REAL)
     assert signal.getsignal(signal.SIGALRM) is handler
-    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+    assert period == timer[1]
+    # The time of the call has passed for the alarm as well.
+    assert left == 0.0 if timer[0] == 0.0 else 0.0 < left < 1000.0 - (LIMIT if run is loop else 0.0)
+    assert not alarms
+
+
+def test_an_alarm_of_the_program_that_is_due_during_the_call_arrives_afterwards(
+    alarms: list[int],
+) -> None:
+    signal.setitimer(signal.ITIMER_REAL, LIMIT / 5)
+    with pytest.raises(TimeLimitExceeded):
+        limited(loop)
+    wait_until("the alarm", lambda: alarms == [signal.SIGALRM])
 
 
 def test_python_code_in_another_thread_is_interrupted() -> None:
@@ -91,7 +127,8 @@ def test_code_that_returns_in_time_is_not_interrupted(in_main_thread: bool) -> N
 
 
 def test_without_a_limit_nothing_is_interrupted() -> None:
-    assert call_with_limit(None, lambda: signal.getitimer(signal.ITIMER_REAL)) == (0.0, 0.0)
+    handler = signal.getsignal(signal.SIGALRM)
+    assert call_with_limit(None, lambda: signal.getsignal(signal.SIGALRM)) is handler
 
 
 @pytest.mark.parametrize("run", [lambda: None, loop], ids=["in time", "too late"])
