@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import faulthandler
 import functools
 import gc
 import os
 import signal
 import sys
+import time
 import uuid
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -89,6 +92,8 @@ _MARKED_PATHS = {
 # tests of each other file run in one process.
 _GROUPED_FOLDERS = ("build/workspace", "ros/viewer", "web")
 _LISTED_GROUPS = 10
+_REACTION_TIMEOUT = 60.0  # s after the time limit of a test
+_RENEWAL_PERIOD = 10.0  # s
 # Groups and folders that take long, in the order in which they start, so that none is left alone at
 # the end. Those that mostly wait are among the first, beside the compiler.
 _SLOW_PATHS = (
@@ -169,6 +174,28 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+class HangingProcess:
+    """Ends a process of tests that does not react to the time limit of a test.
+
+    The limit raises an exception in Python. Code of an extension that does not return is ended with
+    its process, which prints where all threads are.
+    """
+
+    def __init__(self) -> None:
+        """Duplicates the standard error, which pytest does not capture at this time."""
+        self._output = os.dup(2)
+        self._limit = 0.0
+        self._set_at = 0.0
+
+    def pytest_timeout_set_timer(self, settings: Any) -> None:
+        """Delays the end, but not before each test, since this starts a thread."""
+        now = time.monotonic()
+        limit = settings.timeout + _REACTION_TIMEOUT
+        if limit != self._limit or now > self._set_at + _RENEWAL_PERIOD:
+            self._limit, self._set_at = limit, now
+            faulthandler.dump_traceback_later(limit, exit=True, file=self._output)
+
+
 class Results:
     """Prints the slowest groups of tests, with their fixtures, and ends runs that would hang."""
 
@@ -211,7 +238,8 @@ class Results:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Adds the hooks of the process that prints the results."""
+    """Adds the hooks of each process, and those of the one that prints the results."""
+    config.pluginmanager.register(HangingProcess())
     if not hasattr(config, "workerinput"):
         config.option.testrunuid = config.getoption("testrunuid", None) or uuid.uuid4().hex
         config.pluginmanager.register(Results(config.option.testrunuid))

@@ -29,8 +29,8 @@ Point = tuple[float, float]
 PHONE: Final = (390, 844)  # CSS pixels
 _SCRIPT_TIMEOUT: Final = 60.0  # s; for a script of a test, and for the load of a page
 _ANSWER_TIMEOUT: Final = 75.0  # s; for the driver
-# Without a user interface, Chromium takes three quarters of the processor time. The program of that name
-# in /usr/bin is a shell script that starts it, and the driver would end the shell only.
+# Without a user interface, Chromium takes three quarters of the processor time. The program of that
+# name in /usr/bin is a shell script that starts it, and the driver would end the shell only.
 _BROWSER: Final = "/usr/lib/chromium/chromium-headless-shell"
 _DRIVER: Final = "chromedriver"
 _FLAGS: Final = (
