@@ -102,6 +102,12 @@ class SpawnDialog(QDialog):
         self._update_name()
         self._update_ok_button()
 
+    def set_existing(self, existing: Collection[str]) -> None:
+        """Sets the names of the existing models; a name that is being edited is kept."""
+        self._existing = existing
+        if not self.name.hasFocus():
+            self._update_name()
+
     def _create_layout(self) -> None:
         browse = QPushButton("Browse…")
         browse.setObjectName("browse")

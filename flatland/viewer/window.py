@@ -165,6 +165,8 @@ class ViewerWindow(QMainWindow):
         self._models = {
             topic.removeprefix("model/") for topic in topics if topic.startswith("model/")
         }
+        if self._dialog is not None:
+            self._dialog.set_existing(self._models)
         remaining = {topic: value for topic, value in self._layer_bounds.items() if topic in topics}
         if self._layer_bounds and not remaining:
             # No layer is left: another world was loaded.

@@ -251,6 +251,8 @@ def test_relative_path_and_custom_name(
     # The dialog suggests the next free number.
     viewer.click("spawn")
     viewer.until("name", lambda widget: widget["text"] == "parcel2")
+    ros.spawn("crate.model.yaml", "parcel2", pose=(-3, -3, 0))
+    viewer.until("name", lambda widget: widget["text"] == "parcel3")
     box = viewer.widget("number")
     screen.click(box["x"] + 8, box["y"] + box["height"] / 2)
     viewer.until("name", lambda widget: widget["text"] == "parcel")
