@@ -38,6 +38,8 @@ _OPERATORS: dict[type[ast.operator], tuple[str, str]] = {
     ast.BitAnd: ("&", "|"),
     ast.BitOr: ("|", "&"),
 }
+# Functions whose arguments have no order.
+_COMMUTATIVE = {"hypot", "max", "maximum", "min", "minimum"}
 _DROPPED = (ast.Assign, ast.AugAssign, ast.Break, ast.Continue, ast.Delete, ast.Expr, ast.Raise)
 
 
@@ -143,7 +145,8 @@ class _Python:
                 yield from self._call(node)
 
     def _call(self, node: ast.Call) -> Iterator[Mutation]:
-        positional = node.args
+        name = self._text[slice(*self._span(node.func))].rpartition(".")[2]
+        positional = [] if name in _COMMUTATIVE else node.args
         if any(isinstance(argument, ast.GeneratorExp) for argument in positional):
             return  # without parentheses of its own
         for first, second in itertools.pairwise(positional):
@@ -282,6 +285,8 @@ def _cpp(text: str) -> Iterator[Mutation]:
             start, end = spans[0]
             yield Mutation("not", start, end, f"!({text[start:end]})")
     for match in _CPP_CALL.finditer(code):
+        if match[0][:-1] in _COMMUTATIVE:
+            continue
         spans = _cpp_arguments(code, match.end())
         for (start, middle), (second, end) in itertools.pairwise(spans):
             texts = text[start:middle], text[second:end]
