@@ -187,6 +187,7 @@ class HangingProcess:
         self._limit = 0.0
         self._set_at = 0.0
 
+    @pytest.hookimpl(optionalhook=True)  # of pytest-timeout
     def pytest_timeout_set_timer(self, settings: Any) -> None:
         """Delays the end, but not before each test, since this starts a thread."""
         now = time.monotonic()
