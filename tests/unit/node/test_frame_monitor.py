@@ -121,10 +121,18 @@ def when_subscribed(transport: Any, monkeypatch: pytest.MonkeyPatch) -> Callable
 
 def test_only_lasers_without_a_path_cause_a_warning(monitored: Any, when_subscribed: Any) -> None:
     subscribed = {f"/{name}/scan" for name in ("drive", "world", "fixed", "plain", "mute")}
-    subscribed |= {"/plain_tf/scan", "/plain_static/scan", "/plain_cycle/scan"}
+    subscribed |= {"/plain_tf/scan", "/plain_static/scan"}
+    subscribed |= {"/plain_cycle/scan", "/plain_into_cycle/scan"}
     names = [topic.split("/")[1] for topic in sorted(subscribed)]
     sent = {
-        "/tf": {"plain_tf_base": "odom", "plain_cycle_base": "plain_cycle_eye"},
+        "/tf": {
+            "plain_tf_base": "odom",
+            "plain_cycle_base": "plain_cycle_eye",
+            # The frames of other nodes, which may be those of the world elsewhere.
+            "plain_into_cycle_base": "theirs",
+            "theirs": "theirs as well",
+            "theirs as well": "theirs",
+        },
         "/tf_static": {"plain_static_base": "map"},
     }
     when_subscribed(lambda topic, receive: receive(FrameParents(sent[topic])))
