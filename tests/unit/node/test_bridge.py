@@ -53,8 +53,11 @@ def test_a_value_is_published_while_its_topic_has_a_subscriber(node: Any) -> Non
 
 def test_an_output_without_a_subscriber_is_not_computed(node: Any) -> None:
     scans = node.transport.topics["scan"]
+    output, bridge = node.world.ports.find_output("/scan"), node.served._bridge
     step(node, 0.02)
+    assert not bridge.subscribed(output)
     scans.connect()
+    assert bridge.subscribed(output)
     step(node, 0.02)
     assert [scan.stamp for scan in scans.sent] == [4 * STEP_NS, 6 * STEP_NS]
 

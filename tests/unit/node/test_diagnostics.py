@@ -32,6 +32,10 @@ def keys(costs: _Costs) -> list[str]:
     return list(costs.status().values)
 
 
+def test_levels_have_the_numbers_of_the_message() -> None:
+    assert {level.name: level.value for level in Level} == {"OK": 0, "WARN": 1, "ERROR": 2}
+
+
 def test_the_rate_in_lockstep_is_not_judged(world: Any) -> None:
     status = _Rate(Simulation(world, lockstep=True)).status(1.0)
     assert status.level == Level.OK
