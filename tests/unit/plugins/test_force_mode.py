@@ -63,8 +63,12 @@ class TestDriving:
             assert (vx, vy) == pytest.approx((v * math.cos(0.6), v * math.sin(0.6)), abs=1e-5)
             assert omega == pytest.approx(0.0, abs=1e-6)
 
-    def test_constant_torque_up_to_the_target(self, robot: Any) -> None:
-        world = robot(diff("max_force: 40, max_torque: 0.5, friction: .inf"))
+    @pytest.mark.parametrize("share", [1.0, 0.01])  # of the mass
+    def test_constant_torque_up_to_the_target(self, robot: Any, share: float) -> None:
+        world = robot(
+            diff(f"max_force: 40, max_torque: {0.5 * share}, friction: .inf"),
+            bodies=DISC.replace("254.64790894703253", str(254.64790894703253 * share)),
+        )
         drive(world, 0.0, 2.0)
         for k in range(1, 1500):
             world.step()
