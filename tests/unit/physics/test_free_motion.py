@@ -11,6 +11,7 @@ import random
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -175,3 +176,27 @@ def test_all_states_and_contacts_are_those_of_the_solver(seed: int) -> None:
             pair.check()
             if not pair.is_valid:  # The world does not advance any more.
                 return
+
+
+LINEAR_TOLERANCE = np.float32(0.01)  # m/s
+ANGULAR_TOLERANCE = np.float32(2) / np.float32(180) * np.float32(math.pi)  # rad/s
+
+
+@pytest.mark.parametrize("place", [0, 2], ids=["linear", "angular"])
+@pytest.mark.parametrize("is_larger", [False, True])
+def test_a_body_at_the_tolerance_of_sleep_falls_asleep(place: int, is_larger: bool) -> None:
+    speed = ANGULAR_TOLERANCE if place == 2 else LINEAR_TOLERANCE
+    velocity = [0.0, 0.0, 0.0]
+    velocity[place] = float(np.nextafter(speed, np.float32(1)) if is_larger else speed)
+    awake = []
+    for has_hook in (False, True):
+        world = PhysicsWorld()
+        if has_hook:
+            world.pre_solve = lambda *_: None
+        body = world.create_body("dynamic", (0, 0, 0))
+        body.create_circle((0, 0), 0.2, density=1)
+        body.set_velocity(*velocity)
+        for _ in range(60):
+            world.step(0.01, 8, 3)
+        awake.append(body.awake)
+    assert awake == [is_larger] * 2

@@ -30,6 +30,7 @@ def test_bodies_continue_as_after_the_save() -> None:
             world.step(*STEP)
         runs.append(world.body_states())
         bodies[1].set_pose(1.0, 2.0, 3.0)
+        bodies[2].set_velocity(1.0, 2.0, 3.0)
         world.restore_motions(saved)
         assert np.array_equal(world.body_states(), states)
     assert np.array_equal(runs[0], runs[1])
