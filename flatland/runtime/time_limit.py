@@ -53,9 +53,9 @@ def _call_with_signal(seconds: float, action: Callable[[], T]) -> T:
         if is_active:
             raise TimeLimitExceeded
 
-    previous = signal.signal(signal.SIGALRM, interrupt)
     start = time.monotonic()
-    left, period = signal.getitimer(signal.ITIMER_REAL)
+    left, period = signal.setitimer(signal.ITIMER_REAL, 0)
+    previous = signal.signal(signal.SIGALRM, interrupt)
     try:
         try:
             signal.setitimer(signal.ITIMER_REAL, seconds, _RETRY_PERIOD)
@@ -67,9 +67,9 @@ def _call_with_signal(seconds: float, action: Callable[[], T]) -> T:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, previous)
         if left:
-            overdue = 1e-6  # s; 0 would discard the alarm
-            left = max(left - (time.monotonic() - start), overdue)
-            signal.setitimer(signal.ITIMER_REAL, left, period)
+            left -= time.monotonic() - start
+            # 0 would discard an alarm that is due.
+            signal.setitimer(signal.ITIMER_REAL, max(left, 1e-6), period)
 
 
 def _call_traced(seconds: float, action: Callable[[], T]) -> T:
