@@ -426,7 +426,8 @@ DRIVER = dedent(
         p, q = message.pose.pose.position, message.pose.pose.orientation
         pose = p.x, p.y, 2 * math.atan2(q.z, q.w)
         drive.publish(command_to(target, *pose))
-        time.sleep(0.005)
+        # In real time without a goal: the time until others receive a result counts as well.
+        time.sleep(0.02 if target is None or target[2].is_set() else 0.005)
     """
 )
 TOUR = """
@@ -467,7 +468,7 @@ def test_a_tour_reports_times_and_errors(checkout, shell, start, tour_of):
     assert rows["north"][0] == "reached"
     # time [s], path [m], distance [m] and angle [deg] off the goal
     time, path, distance, angle = map(float, rows["east"][1:5])
-    assert 2.0 < time < 60.0
+    assert 2.0 < time < 10.0
     assert path == pytest.approx(2.0, abs=0.1)
     assert distance == pytest.approx(0.0, abs=0.03)
     assert angle == pytest.approx(0.0, abs=1)

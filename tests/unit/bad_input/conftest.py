@@ -23,24 +23,25 @@ class Resources:
 
     Attributes:
         threads: The running threads.
-        files: Number of open files; without sockets, which a ROS node in this process opens.
+        descriptors: Number of open file descriptors, without the sockets that a ROS node of other
+            tests in this process opens at any time.
     """
 
     threads: frozenset[threading.Thread]
-    files: int
+    descriptors: int
 
     @classmethod
     def now(cls) -> Resources:
         """Returns those of this process."""
-        files = 0
+        count = 0
         for descriptor in Path("/proc/self/fd").iterdir():
             with suppress(OSError):  # another thread has closed it
-                files += str(descriptor.readlink()).startswith("/")
-        return cls(frozenset(threading.enumerate()), files)
+                count += not str(descriptor.readlink()).startswith("socket:")
+        return cls(frozenset(threading.enumerate()), count)
 
     def within(self, before: Resources) -> bool:
         """Returns whether nothing was added; what other tests left may end in the meantime."""
-        return self.threads <= before.threads and self.files <= before.files
+        return self.threads <= before.threads and self.descriptors <= before.descriptors
 
 
 def contents(world: flatland.World) -> dict[str, Any]:
@@ -64,7 +65,7 @@ def unchanged() -> Callable[..., AbstractContextManager[None]]:
         process_before = Resources.now()
         before = contents(world) if world is not None else None
         yield
-        # Other threads of this process open files for a moment.
+        # Other threads of this process open descriptors for a moment.
         wait_until("no more resources", lambda: Resources.now().within(process_before))
         if world is not None:
             assert contents(world) == before

@@ -61,16 +61,6 @@ def limited(run: Callable[[], object]) -> None:
     call_with_limit(LIMIT, run)
 
 
-@pytest.mark.parametrize(
-    "block",
-    [loop, stubborn_loop, receive, lambda: time.sleep(1e6), lambda: threading.Event().wait()],
-    ids=["loop", "stubborn loop", "socket", "sleep", "lock"],
-)
-def test_code_that_blocks_the_main_thread_is_interrupted(block: Callable[[], object]) -> None:
-    with pytest.raises(TimeLimitExceeded):
-        limited(block)
-
-
 @pytest.fixture
 def alarms() -> Iterator[list[int]]:
     """The numbers of the alarms that this program has received; without that of pytest-timeout."""
@@ -80,6 +70,22 @@ def alarms() -> Iterator[list[int]]:
     yield received
     signal.signal(signal.SIGALRM, handler)
     signal.setitimer(signal.ITIMER_REAL, *timer)
+
+
+@pytest.mark.parametrize(
+    "block",
+    [loop, stubborn_loop, receive, lambda: time.sleep(1e6), lambda: threading.Event().wait()],
+    ids=["loop", "stubborn loop", "socket", "sleep", "lock"],
+)
+def test_code_that_blocks_the_main_thread_is_interrupted(
+    alarms: list[int], block: Callable[[], object]
+) -> None:
+    handler = signal.getsignal(signal.SIGALRM)
+    with pytest.raises(TimeLimitExceeded):
+        limited(block)
+    assert signal.getsignal(signal.SIGALRM) is handler
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+    assert not alarms
 
 
 @pytest.mark.parametrize("run", [lambda: None, loop], ids=["in time", "too late"])
@@ -93,9 +99,9 @@ def test_the_alarm_of_the_program_is_restored(
         limited(run)
     left, period = signal.getitimer(signal.ITIMER_REAL)
     assert signal.getsignal(signal.SIGALRM) is handler
-    assert period == timer[1]
     # The time of the call has passed for the alarm as well.
     assert left == 0.0 if timer[0] == 0.0 else 0.0 < left < 1000.0 - (LIMIT if run is loop else 0.0)
+    assert period == timer[1]
     assert not alarms
 
 
@@ -126,9 +132,9 @@ def test_code_that_returns_in_time_is_not_interrupted(in_main_thread: bool) -> N
         assert in_thread(run) is None
 
 
-def test_without_a_limit_nothing_is_interrupted() -> None:
-    handler = signal.getsignal(signal.SIGALRM)
-    assert call_with_limit(None, lambda: signal.getsignal(signal.SIGALRM)) is handler
+def test_without_a_limit_nothing_is_interrupted(alarms: list[int]) -> None:
+    assert call_with_limit(None, lambda: signal.getitimer(signal.ITIMER_REAL)) == (0.0, 0.0)
+    assert not alarms
 
 
 @pytest.mark.parametrize("run", [lambda: None, loop], ids=["in time", "too late"])
