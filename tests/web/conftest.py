@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from chromium import Chromium, missing_programs
@@ -59,9 +60,30 @@ def page(room: ViewedWorld, browser: Chromium) -> Iterator[ViewerPage]:
 
 
 @pytest.fixture(scope="module")
-def axe() -> str:
-    """The source of axe-core; the package that contains it is not imported."""
+def violations(browser: Chromium) -> Callable[[], list[Any]]:
+    """Returns what axe finds in the page of the browser in its current state."""
+    # The package that contains axe-core is not imported.
     found = importlib.util.find_spec("axe_playwright_python")
     if found is None or found.origin is None:
         pytest.skip("axe-core is not installed (make setup-dev installs it)")
-    return Path(found.origin).with_name("axe.min.js").read_text(encoding="utf-8")
+    source = Path(found.origin).with_name("axe.min.js").read_text(encoding="utf-8")
+
+    def find() -> list[Any]:
+        # Not as a <script>, which the content security policy of the page forbids.
+        browser.driver.execute_script(source)
+        result = browser.driver.execute_async_script(
+            """
+            const done = arguments[0];
+            axe.run(document, {resultTypes: ["violations"]})
+              .then(done, (error) => done(String(error)));
+            """
+        )
+        assert isinstance(result, dict), result
+        assert len(result["passes"]) > 20
+        return [
+            (rule["id"], node["target"], node["failureSummary"])
+            for rule in result["violations"]
+            for node in rule["nodes"]
+        ]
+
+    return find

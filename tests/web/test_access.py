@@ -15,31 +15,6 @@ from viewer_page import ViewerPage
 from waiting import wait_until
 
 
-@pytest.fixture
-def violations(page: ViewerPage, axe: str) -> Callable[[], list[Any]]:
-    """Returns what axe finds in the page in its current state."""
-    # Not as a <script>, which the content security policy of the page forbids.
-    page.browser.driver.execute_script(axe)
-
-    def find() -> list[Any]:
-        result = page.browser.driver.execute_async_script(
-            """
-            const done = arguments[0];
-            axe.run(document, {resultTypes: ["violations"]})
-              .then(done, (error) => done(String(error)));
-            """
-        )
-        assert isinstance(result, dict), result
-        assert len(result["passes"]) > 20
-        return [
-            (rule["id"], node["target"], node["failureSummary"])
-            for rule in result["violations"]
-            for node in rule["nodes"]
-        ]
-
-    return find
-
-
 @pytest.mark.parametrize("view", ["light", "dark", "phone", "spawn dialog"])
 def test_axe_finds_no_violation(
     room: ViewedWorld, page: ViewerPage, violations: Callable[[], list[Any]], view: str
