@@ -16,10 +16,6 @@ from typing import Final
 from programs import run_program
 from waiting import BUILD_TIMEOUT
 
-# The default folder of ccache, given explicitly since the home of a test may be another one.
-_CACHE: Final = os.environ.get("CCACHE_DIR") or str(
-    Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ccache"
-)
 _COMPILERS: Final = "/usr/lib/ccache"  # of Debian: programs of the names of the compilers
 
 
@@ -40,7 +36,6 @@ def compile_program(
     environment = {
         **os.environ,
         "PATH": f"{_COMPILERS}:{os.environ['PATH']}",
-        "CCACHE_DIR": _CACHE,
         # Another folder in each run; paths below it are relative in the cache.
         "CCACHE_BASEDIR": str(program.parent),
         "CCACHE_NOHASHDIR": "1",
