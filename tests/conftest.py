@@ -214,8 +214,8 @@ class Results:
         """Adds the time of a test, or of its fixtures, to its group.
 
         If a process of the tests has ended within a test, the run ends: pytest-xdist 3.8 may wait
-        forever for the process that replaces it. This includes the time limit of a test, which ends
-        the process. The hook is the last one, so that the test is reported as failed before.
+        forever for the process that replaces it. This includes a process that `HangingProcess`
+        ends. The hook is the last one, so that the test is reported as failed before.
         """
         if report.when == "???":  # as pytest-xdist marks the report of such a test
             pytest.exit("a process of the tests has ended, see above", returncode=1)
