@@ -198,17 +198,13 @@ def count_frames(browser: Any) -> tuple[list[float], list[float]]:
         "((canvas) => [canvas.width, canvas.height])(document.querySelector('#canvas'))"
     )
     url = EMPTY.replace("WIDTH", str(width)).replace("HEIGHT", str(height)).replace("\n", "")
-    page = browser.driver.current_window_handle
-    canvas = browser.new_tab()
-    browser.open(url)
     frames, empty = [], []
     for _ in range(WINDOWS):
-        browser.driver.switch_to.window(canvas)
-        empty.append(browser.driver.execute_async_script(COUNT, WINDOW))
-        browser.driver.switch_to.window(page)
+        with browser.new_tab(url):
+            empty.append(browser.run_async(COUNT, WINDOW))
         browser.until("!document.hidden")
         browser.click("#fit")
-        frames.append(browser.driver.execute_async_script(PAN, WINDOW))
+        frames.append(browser.run_async(PAN, WINDOW))
     return frames, empty
 
 

@@ -18,11 +18,12 @@ from typing import Any
 
 import pytest
 
-# Selenium installs Trio, whose plugin for Hypothesis takes a third of the time of its import.
-os.environ["HYPOTHESIS_NO_PLUGINS"] = "1"
+# Each process of pytest-xdist imports Hypothesis and all modules of the tests, and would spend most
+# of this time with their compilation. The processes share what each of them has compiled.
+sys.dont_write_bytecode = False
 
-from hypothesis import HealthCheck, settings
-from hypothesis.internal.conjecture import providers
+from hypothesis import HealthCheck, settings  # noqa: E402
+from hypothesis.internal.conjecture import providers  # noqa: E402
 
 # A shell starts programs in the background with SIGINT ignored, which the programs that the tests
 # start, and end with SIGINT, would inherit.
@@ -38,9 +39,6 @@ if os.access(_MEMORY, os.W_OK):
     if _state.f_bavail * _state.f_frsize > _MEMORY_NEEDED and not _state.f_flag & os.ST_NOEXEC:
         os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(_MEMORY))
 
-# Each process of pytest-xdist imports all modules of the tests, most of which time it would spend
-# with their compilation. The processes share what each of them has compiled.
-sys.dont_write_bytecode = False
 # Hypothesis would read the source of all imported modules, including packages of Debian, for
 # numbers and texts to try. This takes several seconds in each process after each import of a large
 # package, and the examples would depend on the tests that have run in a process before.

@@ -89,7 +89,7 @@ def _capture_desktop(browser: Chromium, url: str, path: Path) -> None:
     page.open(f"{url}{_ROBOT_VIEW}&show=trails")
     browser.click("#plots-toggle")
     _choose_series(browser, ("/odometry/filtered/twist/0", "/odometry/filtered/twist/2"))
-    browser.driver.execute_script(
+    browser.run(
         "const list = document.querySelector('#plot-window'); list.value = '10';"
         "list.dispatchEvent(new Event('change')); document.activeElement.blur();"
     )
@@ -180,7 +180,7 @@ class Recording:
             time.sleep(_FRAME_PERIOD)
             after = self._simulation.request_steps(_FRAME_STEPS).result(_DRAWN_TIMEOUT)
             self._browser.until("flatland.state.worlds[0].time > arguments[0]", 1e-9 * after - 1e-6)
-        self._browser.driver.execute_async_script(
+        self._browser.run_async(
             "const [done] = arguments; requestAnimationFrame(() => requestAnimationFrame(done));"
         )
         image = Image.fromarray(self._browser.picture())
@@ -263,7 +263,7 @@ def _record(browser: Chromium, url: str, simulation: Simulation, path: Path) -> 
 
 def _choose_file(browser: Chromium, name: str) -> None:
     """Selects a model file in the dialog to spawn models."""
-    browser.driver.execute_script(
+    browser.run(
         "const list = document.querySelector('#spawn-file');"
         "const found = [...list.options].find((option) => option.text.includes(arguments[0]));"
         "list.value = found.value; list.dispatchEvent(new Event('change', {bubbles: true}));",

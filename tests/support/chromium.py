@@ -1,4 +1,4 @@
-"""A headless Chromium with its driver, for tests and pictures of the browser viewer.
+"""A headless Chromium for tests and pictures of the browser viewer.
 
 Input is sent through the DevTools protocol, and passes through the same code of the browser as that
 of a mouse, a keyboard or a touch screen. All coordinates are CSS pixels of the page.
@@ -18,22 +18,21 @@ from urllib.parse import urldefrag
 import cv2
 import numpy as np
 import numpy.typing as npt
-from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
-from urllib3.exceptions import HTTPError
+from devtools import DevTools, DevToolsError
 from waiting import wait_until
 
 Image = npt.NDArray[np.uint8]
 Point = tuple[float, float]
 
 PHONE: Final = (390, 844)  # CSS pixels
-_SCRIPT_TIMEOUT: Final = 60.0  # s; for a script of a test, and for the load of a page
-_ANSWER_TIMEOUT: Final = 75.0  # s; for the driver
 # Without a user interface, Chromium takes three quarters of the processor time. The program of that
-# name in /usr/bin is a shell script that starts it, and the driver would end the shell only.
+# name in /usr/bin is a shell script that starts it.
 _BROWSER: Final = "/usr/lib/chromium/chromium-headless-shell"
-_DRIVER: Final = "chromedriver"
 _FLAGS: Final = (
+    "--disable-background-networking",
+    "--disable-hang-monitor",
+    "--disable-popup-blocking",
+    "--no-first-run",
     "--no-sandbox",  # the sandbox does not start for root
     "--disable-dev-shm-usage",  # /dev/shm of containers is small
     "--use-angle=swiftshader",  # OpenGL without a graphics card
@@ -48,6 +47,17 @@ _HARMLESS: Final = (
     "GPU stall due to ReadPixels",  # without GPU compositing, the browser reads the canvas
     "this message will no longer repeat",
     "Blocked autofocusing",  # in a frame of another page, whose focus remains
+)
+_EXCEPTION: Final = "Runtime.exceptionThrown"
+_NEW_CONTEXT: Final = "Runtime.executionContextCreated"
+_EVENTS: Final = (
+    "Log.entryAdded",
+    "Network.requestWillBeSent",
+    "Network.webSocketCreated",
+    "Page.lifecycleEvent",
+    "Runtime.consoleAPICalled",
+    _EXCEPTION,
+    _NEW_CONTEXT,
 )
 # Key: code and virtual key code, for keys that are not a single letter or digit.
 _KEYS: Final = {
@@ -90,33 +100,17 @@ requestAnimationFrame(() => done(find()));
 
 def missing_programs() -> list[str]:
     """Returns the required programs that are not installed."""
-    return [name for name in (_BROWSER, _DRIVER) if shutil.which(name) is None]
+    return [name for name in (_BROWSER,) if shutil.which(name) is None]
 
 
-class _Driver(webdriver.Chrome):
-    """The driver of Selenium; a browser that does not answer is ended with its log shown."""
-
-    def __init__(self, options: webdriver.ChromeOptions, log: Path) -> None:
-        self._log = log
-        service = Service(shutil.which(_DRIVER) or "", log_output=str(log))
-        super().__init__(options=options, service=service)
-        self.command_executor.client_config.timeout = _ANSWER_TIMEOUT
-
-    def execute(self, driver_command: str, params: dict[str, Any] | None = None) -> dict[str, Any]:
-        try:
-            return super().execute(driver_command, params)
-        except HTTPError as error:
-            if self.service.process is not None:
-                self.service.process.kill()
-            error.add_note(f"{self._log}:\n{self._log.read_text()[-5000:]}")
-            raise
+class JavaScriptError(Exception):
+    """A script has thrown an exception."""
 
 
 class Chromium:
     """A headless browser; methods concern its current tab.
 
     Attributes:
-        driver: The driver of Selenium.
         downloads: Folder of downloaded files.
     """
 
@@ -130,22 +124,34 @@ class Chromium:
             size: Width and height of the page [CSS pixels].
             flags: More flags of Chromium.
         """
-        options = webdriver.ChromeOptions()
-        options.binary_location = shutil.which(_BROWSER) or ""
-        for flag in (*_FLAGS, *flags):
-            options.add_argument(flag)
-        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
         self.downloads = downloads
-        self.driver = _Driver(options, downloads / "chromedriver.log")
-        self.driver.set_script_timeout(_SCRIPT_TIMEOUT)
-        self.driver.set_page_load_timeout(_SCRIPT_TIMEOUT)
-        self.command(
+        self._events: list[tuple[str, Any]] = []
+        profile = f"--user-data-dir={downloads / 'profile'}"
+        command = (_BROWSER, *_FLAGS, profile, *flags, "about:blank")
+        self._tools = DevTools(command, downloads / "chromium.log", self._add_event)
+        self._tools.call(
             "Browser.setDownloadBehavior",
             behavior="allow",
             downloadPath=str(downloads),
             eventsEnabled=False,
         )
+        self._context: dict[str, str] = {}
+        pages = self._tools.call("Target.getTargets")["targetInfos"]
+        self._session = self._attach_to(pages[0]["targetId"])
         self.resize(*size)
+
+    def _add_event(self, message: Any) -> None:
+        if message.get("method") in _EVENTS:
+            self._events.append((message["method"], message["params"]))
+
+    def _attach_to(self, target: str) -> str:
+        """Returns a session for a page."""
+        attached = self._tools.call("Target.attachToTarget", targetId=target, flatten=True)
+        session = str(attached["sessionId"])
+        for domain in ("Page", "Runtime", "Log"):
+            self._tools.call(f"{domain}.enable", session)
+        self._tools.call("Page.setLifecycleEventsEnabled", session, enabled=True)
+        return session
 
     def __enter__(self) -> Chromium:
         """Returns the browser, which is closed at the end of the block."""
@@ -156,21 +162,65 @@ class Chromium:
         self.close()
 
     def close(self) -> None:
-        """Ends the browser and its driver."""
-        self.driver.quit()
+        """Ends the browser."""
+        self._tools.close()
 
     def command(self, method: str, **parameters: Any) -> Any:
         """Calls a method of the DevTools protocol and returns its result."""
-        return self.driver.execute_cdp_cmd(method, parameters)
+        return self._tools.call(method, self._session, **parameters)
 
     # -- the page --------------------------------------------------------------------------
 
     def open(self, url: str) -> None:
         """Loads a page, also if the address differs from the current one only in its fragment."""
         # Only then: each navigation costs a process of the browser.
-        if urldefrag(self.driver.current_url).url == urldefrag(url).url:
-            self.driver.get("about:blank")
-        self.driver.get(url)
+        if urldefrag(self.url).url == urldefrag(url).url:
+            self._load("about:blank")
+        self._load(url)
+
+    def _load(self, url: str) -> None:
+        """Loads a page and waits until it is complete."""
+        self._forget("Page.lifecycleEvent")
+        self._forget(_NEW_CONTEXT)
+        answer = self.command("Page.navigate", url=url)
+        assert "errorText" not in answer, f"{url}: {answer['errorText']}"
+        loader = answer["loaderId"]
+        self._tools.wait_for(
+            lambda: any(
+                event.get("loaderId") == loader and event["name"] == "load"
+                for event in self._forget("Page.lifecycleEvent")
+            )
+        )
+
+    @property
+    def url(self) -> str:
+        """The address of the current page."""
+        return str(self.evaluate("location.href"))
+
+    @contextlib.contextmanager
+    def frame(self) -> Iterator[None]:
+        """Runs scripts in the only frame of the page for the duration of the block."""
+        (frame,) = self.command("Page.getFrameTree")["frameTree"]["childFrames"]
+        contexts = [event["context"] for event in self._forget(_NEW_CONTEXT)]
+        found = [each for each in contexts if each["auxData"]["frameId"] == frame["frame"]["id"]]
+        self._context = {"uniqueContextId": found[-1]["uniqueId"]}
+        try:
+            yield
+        finally:
+            self._context = {}
+
+    @contextlib.contextmanager
+    def new_tab(self, url: str) -> Iterator[None]:
+        """Opens a page in a new tab, which is the current one for the duration of the block."""
+        session = self._session
+        target = self._tools.call("Target.createTarget", url="about:blank")["targetId"]
+        self._session = self._attach_to(target)
+        try:
+            self._load(url)
+            yield
+        finally:
+            self._tools.call("Target.closeTarget", targetId=target)
+            self._session = session
 
     @contextlib.contextmanager
     def minimized(self) -> Iterator[None]:
@@ -187,18 +237,51 @@ class Chromium:
 
     def evaluate(self, expression: str, *arguments: Any) -> Any:
         """Returns the value of an expression of JavaScript; the arguments are `arguments[0]`, …."""
-        return self.driver.execute_script(f"return ({expression})", *arguments)
+        return self.run(f"return ({expression});", *arguments)
+
+    def run(self, script: str, *arguments: Any) -> Any:
+        """Runs the body of a function of JavaScript, whose arguments are `arguments[0]`, ….
+
+        Returns:
+            The value that it returns; the page waits for a promise.
+
+        Raises:
+            JavaScriptError: The script has thrown an exception.
+        """
+        answer = self.command(
+            "Runtime.evaluate",
+            expression=f"(function () {{ {script}\n}}).apply(null, {json.dumps(arguments)})",
+            awaitPromise=True,
+            returnByValue=True,
+            userGesture=True,
+            **self._context,
+        )
+        if "exceptionDetails" in answer:
+            raise JavaScriptError(_text_of(answer["exceptionDetails"]))
+        result = answer["result"]
+        if "unserializableValue" in result:
+            return float(result["unserializableValue"].replace("Infinity", "inf"))
+        return result.get("value")
+
+    def run_async(self, script: str, *arguments: Any) -> Any:
+        """Runs the body of a function and returns what it passes to its last argument."""
+        return self.run(
+            f"return new Promise((done) => {{ (function () {{ {script}\n}})"
+            ".apply(null, [...arguments, done]); });",
+            *arguments,
+        )
 
     def until(self, expression: str, *arguments: Any) -> Any:
-        """Waits until an expression of JavaScript is true, and returns its value."""
+        """Waits until an expression, not of an element, is true, and returns its value."""
         try:
             return wait_until(
                 expression, lambda: self.evaluate(expression, *arguments), poll_period=0.02
             )
         except BaseException as error:
             path = self.downloads / "not_fulfilled.png"
-            path.write_bytes(self.driver.get_screenshot_as_png())
-            error.add_note(f"the page is {self.driver.current_url}, see {path}")
+            with contextlib.suppress(DevToolsError, RuntimeError):
+                cv2.imwrite(str(path), self.picture()[:, :, ::-1])
+                error.add_note(f"the page is {self.url}, see {path}")
             raise
 
     def resize(self, width: int, height: int, *, touch: bool = False) -> None:
@@ -345,7 +428,7 @@ class Chromium:
         last: list[Any] = [None]
 
         def settled() -> Any:
-            before, last[0] = last[0], self.driver.execute_async_script(_CENTER, selector)
+            before, last[0] = last[0], self.run_async(_CENTER, selector)
             return last[0] if last[0] == before else None
 
         x, y = wait_until(f"{selector} can be clicked", settled, poll_period=0.0)
@@ -353,25 +436,40 @@ class Chromium:
 
     # -- logs ------------------------------------------------------------------------------
 
+    def _forget(self, method: str) -> list[Any]:
+        """Returns the events of a kind since the last call."""
+        found = [event for kind, event in self._events if kind == method]
+        self._events = [(kind, event) for kind, event in self._events if kind != method]
+        return found
+
     def console(self) -> list[str]:
         """Returns the warnings and errors of the console since the last call."""
-        return [
-            entry["message"]
-            for entry in self.driver.get_log("browser")
-            if entry["level"] in ("WARNING", "SEVERE")
-            and not any(text in entry["message"] for text in _HARMLESS)
+        self.evaluate("null")  # the events before it have then been received
+        logged = [event["entry"] for event in self._forget("Log.entryAdded")]
+        texts = [
+            *(_text_of(event["exceptionDetails"]) for event in self._forget(_EXCEPTION)),
+            *(
+                " ".join(str(each.get("value", each.get("description"))) for each in event["args"])
+                for event in self._forget("Runtime.consoleAPICalled")
+                if event["type"] in ("warning", "error", "assert")
+            ),
+            *(
+                f"{entry['text']} {entry.get('url', '')}"
+                for entry in logged
+                if entry["level"] in ("warning", "error")
+            ),
         ]
+        return [text for text in texts if not any(harmless in text for harmless in _HARMLESS)]
 
-    def requested_urls(self) -> list[str]:
-        """Returns the addresses of all requests of the page since the last call."""
-        urls = []
-        for entry in self.driver.get_log("performance"):
-            message = json.loads(entry["message"])["message"]
-            if message["method"] == "Network.requestWillBeSent":
-                urls.append(message["params"]["request"]["url"])
-            elif message["method"] == "Network.webSocketCreated":
-                urls.append(message["params"]["url"])
-        return urls
+    @contextlib.contextmanager
+    def requests(self) -> Iterator[list[str]]:
+        """Yields a list that contains, after the block, the addresses of its requests."""
+        urls: list[str] = []
+        self.command("Network.enable")
+        yield urls
+        self.command("Network.disable")
+        urls += [event["request"]["url"] for event in self._forget("Network.requestWillBeSent")]
+        urls += [event["url"] for event in self._forget("Network.webSocketCreated")]
 
     def downloaded(self, pattern: str) -> Path:
         """Waits for a complete download whose name matches a pattern, and returns its path."""
@@ -401,6 +499,11 @@ def line(start: Point, end: Point, steps: int) -> list[Point]:
     return [
         (start[0] + f * (end[0] - start[0]), start[1] + f * (end[1] - start[1])) for f in fractions
     ]
+
+
+def _text_of(details: Any) -> str:
+    """Returns the text of an exception of JavaScript."""
+    return str(details.get("exception", {}).get("description") or details["text"])
 
 
 def _key(key: str) -> dict[str, Any]:

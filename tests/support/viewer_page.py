@@ -55,7 +55,7 @@ class ViewerPage:
 
     def reset(self) -> None:
         """Returns to the state after loading: view, selection, displays, tools, plots, dialogs."""
-        self.browser.driver.execute_async_script(_RESET)
+        self.browser.run_async(_RESET)
 
     def wait_for_poses(
         self, poses: dict[str, tuple[float, float, float]], *, paused: bool = False
@@ -116,9 +116,7 @@ class ViewerPage:
     def wait_for_frame(self) -> None:
         """Waits until the page has drawn what it has received."""
         # The page draws before the callbacks that are requested later.
-        self.browser.driver.execute_async_script(
-            "requestAnimationFrame(() => requestAnimationFrame(arguments[0]))"
-        )
+        self.browser.run_async("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
 
     def canvas(self, image: Image) -> Image:
         """Returns the part of a screenshot that is the canvas; the rest is black."""

@@ -26,7 +26,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
 def closed_page(browser: Chromium) -> Iterator[None]:
     """Closes the page after the tests of a file; it would use half a processor in other tests."""
     yield
-    browser.driver.get("about:blank")
+    browser.open("about:blank")
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def room(shared_room: ViewedWorld) -> ViewedWorld:
 def page(room: ViewedWorld, browser: Chromium) -> Iterator[ViewerPage]:
     """The page with the room in its first state; the test fails if the page logs an error."""
     page = ViewerPage(browser)
-    if browser.driver.current_url.startswith(room.viewer.url):
+    if browser.url.startswith(room.viewer.url):
         page.reset()
     else:
         browser.console()
@@ -70,8 +70,8 @@ def violations(browser: Chromium) -> Callable[[], list[Any]]:
 
     def find() -> list[Any]:
         # Not as a <script>, which the content security policy of the page forbids.
-        browser.driver.execute_script(source)
-        result = browser.driver.execute_async_script(
+        browser.run(source)
+        result = browser.run_async(
             """
             const done = arguments[0];
             axe.run(document, {resultTypes: ["violations"]})

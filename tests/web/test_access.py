@@ -147,10 +147,10 @@ def test_the_page_fits_a_phone(room: ViewedWorld, page: ViewerPage) -> None:
 
 
 def test_all_requests_go_to_the_simulator(room: ViewedWorld, browser: Chromium) -> None:
-    browser.requested_urls()
     page = ViewerPage(browser)
-    page.open(room.viewer.url)
-    urls = [urlsplit(url) for url in browser.requested_urls()]
+    with browser.requests() as requests:
+        page.open(room.viewer.url)
+    urls = [urlsplit(url) for url in requests]
     remote = [url for url in urls if url.scheme not in ("data", "blob", "about")]
     assert {url.netloc for url in remote} == {urlsplit(room.viewer.url).netloc}
     assert {url.scheme for url in remote} == {"http", "ws"}

@@ -31,7 +31,7 @@ def test_a_page_of_another_site_cannot_use_the_simulator(
     room: ViewedWorld, browser: Chromium
 ) -> None:
     browser.open("data:text/html,<title>elsewhere</title>")
-    result = browser.driver.execute_async_script(
+    result = browser.run_async(
         """
         const [address, done] = arguments;
         const socket = new WebSocket(address, ["flatland.1"]);

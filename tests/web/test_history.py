@@ -61,7 +61,7 @@ def test_the_user_returns_to_earlier_states(room: ViewedWorld, page: ViewerPage)
     room.ask(lambda: room.world.move_model("robot", (3, 3, 0)))
     browser.click("#reset")
     wait_until("the first state", lambda: room.pose("robot") == pytest.approx((-2, 1, 0), abs=1e-3))
-    browser.until("document.querySelector('#notices .outlined')")
+    browser.until("document.querySelector('#notices .outlined') !== null")
     browser.key("z", modifiers=CTRL)
     wait_until("the state before", lambda: room.pose("robot") == pytest.approx((3, 3, 0), abs=0.05))
 

@@ -46,10 +46,8 @@ def test_a_cell_shows_the_world_while_the_program_steps_it(
         with notebook(view._repr_html_()) as url:
             browser.console()
             browser.open(url)
-            frame = browser.driver.find_element("tag name", "iframe")
-            assert frame.size["height"] == 400
-            browser.driver.switch_to.frame(frame)
-            try:
+            assert browser.evaluate("document.querySelector('iframe').offsetHeight") == 400
+            with browser.frame():
                 browser.until("window.flatland?.state.worlds[0]?.models.robot?.pose")
                 world.step(100)
                 browser.until("flatland.state.worlds[0].time > arguments[0]", world.time - 1e-6)
@@ -59,7 +57,5 @@ def test_a_cell_shows_the_world_while_the_program_steps_it(
                 browser.until("document.querySelector('#pause').click() || true")
                 browser.until("document.querySelector('#pause').innerText.includes('Resume')")
                 assert world.paused
-            finally:
-                browser.driver.switch_to.default_content()
             assert browser.console() == []
             browser.open("about:blank")

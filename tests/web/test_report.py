@@ -60,12 +60,12 @@ def report(request: pytest.FixtureRequest, browser: Chromium, address: str) -> A
     """The report in a colour scheme."""
     browser.resize(1200, 1600)
     browser.console()
-    browser.requested_urls()
     browser.prefer(prefers_color_scheme=request.param)
-    browser.open(address)
-    yield browser
+    with browser.requests() as urls:
+        browser.open(address)
+        yield browser
     assert browser.console() == []
-    assert {url.partition("?")[0] for url in browser.requested_urls()} <= {address, "about:blank"}
+    assert {url.partition("?")[0] for url in urls} <= {address, "about:blank"}
     browser.prefer()
     browser.resize(1200, 800)
 
@@ -170,7 +170,7 @@ def test_a_link_replays_its_run_in_the_viewer(
         # The end remains visible.
         browser.until("flatland.state.worlds[0].time > 2.99")
         page.wait_for_poses({"robot": (x, y, 0.0)})
-        viewers.append(browser.driver.current_url)
+        viewers.append(browser.url)
         server.wait_for_line("(?s)" + "no difference.*" * number)
     assert viewers[0] != viewers[1]
     assert browser.console() == []

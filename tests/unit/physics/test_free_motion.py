@@ -178,6 +178,31 @@ def test_all_states_and_contacts_are_those_of_the_solver(seed: int) -> None:
                 return
 
 
+@pytest.mark.parametrize("direction", [(1, 0), (-1, 0), (0, 1), (0, -1)])
+@pytest.mark.parametrize("distance", [0.6, 0.64, 0.68])
+def test_a_moving_platform_pushes_a_body_in_every_direction(
+    direction: tuple[int, int], distance: float
+) -> None:
+    x, y = direction
+    paths = []
+    for has_hook in (False, True):
+        world = PhysicsWorld()
+        if has_hook:
+            world.pre_solve = lambda *_: None
+        platform = world.create_body("kinematic", (0, 0, 0))
+        platform.create_polygon([(-0.2, -0.2), (0.2, -0.2), (0.2, 0.2), (-0.2, 0.2)], density=1)
+        platform.set_velocity(x, y, 0)
+        ball = world.create_body("dynamic", (distance * x, distance * y, 0))
+        ball.create_circle((0, 0), 0.2, density=1)
+        path = []
+        for _ in range(80):
+            world.step(0.005, 10, 10)
+            path.append(world.body_states().tobytes())
+        paths.append(path)
+        assert np.hypot(*ball.pose[:2]) > distance
+    assert paths[0] == paths[1]
+
+
 LINEAR_TOLERANCE = np.float32(0.01)  # m/s
 ANGULAR_TOLERANCE = np.float32(2) / np.float32(180) * np.float32(math.pi)  # rad/s
 
