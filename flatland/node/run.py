@@ -121,6 +121,9 @@ class NodeRun:
         # Late, because the import would delay the registration of the clock.
         from flatland.node.served_world import ServedWorld
 
+        # The collector need not examine the objects of modules, neither in a pause of a step nor at
+        # the end of the process, where this would take most of the time.
+        gc.freeze()
         with closing(ServedWorld(parameters, transport, clock)) as served, more(served):
             self._fault_reports.world = served.world
             self._simulation = served.simulation
