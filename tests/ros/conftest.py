@@ -21,6 +21,7 @@ from free_ports import free_port
 pytest.importorskip("rospy", reason="ROS is not installed")
 pytest.importorskip("flatland.msg", reason="the messages are not built")
 
+import forked_ros
 import rosgraph
 import roslib.packages
 import rospy
@@ -288,12 +289,26 @@ def server_path(ros_environment: dict[str, str]) -> str:
     return str(found[0])
 
 
+@pytest.fixture(scope="session")
+def forks(
+    ros_environment: dict[str, str], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Path]:
+    """The socket of a process that forks programs."""
+    address = tmp_path_factory.mktemp("forks") / "socket"
+    process = Program([sys.executable, forked_ros.__file__, address], env=ros_environment)
+    process.wait_for_line("ready")
+    yield address
+    process.stop()
+
+
 class Launcher:
     """Starts and stops nodes and launch files."""
 
-    def __init__(self, environment: dict[str, str], server: str) -> None:
+    def __init__(self, environment: dict[str, str], server: str, forks: Path) -> None:
         self.environment = environment
         self._server = server
+        self._forks = forks
+        self._own_environment = environment  # that of the process that forks
         self._processes: list[Program] = []
 
     def add_plugins(self, folder: Path, source: str, module: str) -> None:
@@ -303,9 +318,11 @@ class Launcher:
 
     def program(self, *command: str, **environment: str) -> Program:
         """Starts a program."""
-        process = Program(command, env={**self.environment, **environment})
-        self._processes.append(process)
-        return process
+        process, env = None, {**self.environment, **environment}
+        if forked_ros.can_fork(command, env, self._own_environment):
+            process = forked_ros.ForkedProcess(self._forks, command, env=env)
+        self._processes.append(Program(command, env=env, process=process))
+        return self._processes[-1]
 
     def node(self, *arguments: str) -> Program:
         """Starts a server with a command line."""
@@ -362,17 +379,19 @@ def wait_until_server_is_ready(process: Program) -> None:
 
 
 @pytest.fixture
-def launcher(ros_master: dict[str, str], server_path: str) -> Iterator[Launcher]:
+def launcher(ros_master: dict[str, str], server_path: str, forks: Path) -> Iterator[Launcher]:
     """Starts nodes that are stopped at the end of the test."""
-    launcher = Launcher(ros_master, server_path)
+    launcher = Launcher(ros_master, server_path, forks)
     yield launcher
     launcher.stop()
 
 
 @pytest.fixture(scope="module")
-def module_launcher(ros_master: dict[str, str], server_path: str) -> Iterator[Launcher]:
+def module_launcher(
+    ros_master: dict[str, str], server_path: str, forks: Path
+) -> Iterator[Launcher]:
     """Starts nodes that are stopped at the end of the file."""
-    launcher = Launcher(ros_master, server_path)
+    launcher = Launcher(ros_master, server_path, forks)
     yield launcher
     launcher.stop()
 

@@ -34,6 +34,7 @@ class Program:
         stdout: int = subprocess.PIPE,
         stderr: int = subprocess.PIPE,
         input: str = "",  # noqa: A002 - as subprocess
+        process: Any = None,
     ) -> None:
         """Starts the program in a session of its own.
 
@@ -44,9 +45,10 @@ class Program:
             stdout: File descriptor for the standard output, if it is not to be read.
             stderr: The same for the standard error; `subprocess.STDOUT` for that of `stdout`.
             input: Text for the standard input.
+            process: The program, if it has been started already.
         """
         self.command = [str(word) for word in command]
-        self.process = subprocess.Popen(
+        self.process = process or subprocess.Popen(
             self.command,
             env=env,
             cwd=cwd,
