@@ -168,7 +168,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_collection_finish() -> None:
     """Excludes modules and tests from garbage collection, which otherwise visits all of them."""
     gc.enable()
-    gc.collect()
     gc.freeze()
 
 

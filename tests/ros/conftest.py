@@ -37,8 +37,9 @@ from flatland.srv import DeleteModel, MoveModel, ResetWorld, SpawnModel, StepWor
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Ignores warnings caused by rospy: deprecated functions, sockets that are closed late."""
+    own = f"{Path(__file__).parent}/"
     for item in items:
-        if Path(__file__).parent in item.path.parents:
+        if str(item.path).startswith(own):
             for ignored in ("ignore::DeprecationWarning", "ignore::ResourceWarning"):
                 item.add_marker(pytest.mark.filterwarnings(ignored))
 

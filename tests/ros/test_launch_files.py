@@ -9,7 +9,6 @@ import dataclasses
 from typing import Any
 
 import pytest
-import roslaunch
 import roslib.packages
 
 from flatland.node.parameters import NodeParameters, read_parameters
@@ -48,6 +47,9 @@ NOT_ARGUMENTS = {"benchmark_duration", "map_frame", "map_resolution"}
 
 def parameters(package: str, *arguments: str) -> dict[str, Any]:
     """Returns the parameters of the node that `server.launch` of a package sets."""
+    # It imports setuptools, and each process of the tests imports this module.
+    import roslaunch
+
     (file,) = roslib.packages.find_resource(package, "server.launch")
     given = [(file, ["world_path:=/a/world.yaml", "show_viz:=false", *arguments])]
     config = roslaunch.config.load_config_default(given, None, assign_machines=False)
