@@ -6,7 +6,9 @@ import contextlib
 import faulthandler
 import functools
 import gc
+import itertools
 import os
+import re
 import signal
 import sys
 import time
@@ -90,6 +92,7 @@ _MARKED_PATHS = {
 # tests of each other file run in one process.
 _GROUPED_FOLDERS = ("build/workspace", "ros/viewer", "web")
 _LISTED_GROUPS = 10
+_FOLDER_NUMBERS = itertools.count()
 _REACTION_TIMEOUT = 60.0  # s after the time limit of a test
 _RENEWAL_PERIOD = 10.0  # s
 # Groups and folders that take long, in the order in which they start, so that none is left alone at
@@ -241,6 +244,15 @@ def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):
         config.option.testrunuid = config.getoption("testrunuid", None) or uuid.uuid4().hex
         config.pluginmanager.register(Results(config.option.testrunuid))
+
+
+@pytest.fixture
+def tmp_path(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An empty folder; that of pytest searches the folders of all earlier tests for its number."""
+    name = re.sub(r"\W", "_", request.node.name)[:30]
+    path = tmp_path_factory.getbasetemp() / f"{name}-{next(_FOLDER_NUMBERS)}"
+    path.mkdir()
+    return path
 
 
 @pytest.fixture(scope="session")
