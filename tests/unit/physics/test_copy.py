@@ -213,6 +213,19 @@ def test_a_world_can_be_reverted_again_and_again(seed: int) -> None:
     step_all(world, source.copy())
 
 
+def test_each_fixture_is_reverted_to_its_own_values() -> None:
+    world = PhysicsWorld()
+    body = world.create_body("dynamic", (0.0, 0.0, 0.0))
+    for x in (0.0, 1.0, 2.0):
+        body.create_circle((x, 0.0), 0.1, density=1.0 + x, friction=0.1 * x)
+    before = [(fixture.density, fixture.friction) for fixture in body.fixtures]
+    source = world.copy()
+    for fixture in body.fixtures:
+        fixture.friction = 0.9
+    world.become_copy_of(source)
+    assert [(fixture.density, fixture.friction) for fixture in body.fixtures] == before
+
+
 @PROPERTY
 @given(seed=SEEDS)
 def test_a_copy_steps_like_its_original(seed: int) -> None:
