@@ -39,7 +39,7 @@ _OPERATORS: dict[type[ast.operator], tuple[str, str]] = {
     ast.BitOr: ("|", "&"),
 }
 # Functions whose arguments have no order.
-_COMMUTATIVE = {"hypot", "max", "maximum", "min", "minimum"}
+_COMMUTATIVE = {"b2Max", "b2Min", "hypot", "max", "maximum", "min", "minimum"}
 _DROPPED = (ast.Assign, ast.AugAssign, ast.Break, ast.Continue, ast.Delete, ast.Expr, ast.Raise)
 
 

@@ -65,8 +65,9 @@ class Topic(MessageQueue):
 
     @property
     def connected(self) -> bool:
-        """Whether a publisher is connected."""
-        return self._subscriber.get_num_connections() > 0
+        """Whether a publisher has accepted the connection."""
+        # rospy lists a connection before the publisher accepts it with its header.
+        return any(connection.header for connection in self._subscriber.impl.connections)
 
     def close(self) -> None:
         """Unsubscribes."""

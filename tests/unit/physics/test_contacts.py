@@ -358,3 +358,19 @@ def test_a_contact_is_stale_after_pre_solve(world: PhysicsWorld) -> None:
     assert kept[0].points.shape == (1, 2)
     with pytest.raises(StaleHandleError, match="only during the call of pre_solve"):
         kept[0].enabled = False
+
+
+def test_a_collector_goes_on_after_another_one_of_its_body_is_removed() -> None:
+    world = PhysicsWorld()
+    wall = world.create_body("static", (0, 0, 0))
+    wall.create_edges(np.array([[1, -1, 1, 1]]))
+    ball = world.create_body("dynamic", (0, 0, 0))
+    ball.create_circle((0, 0), 0.2, density=1)
+    world.own_bodies([wall, ball], True)
+    removed, remaining = world.collect_touches([ball]), world.collect_touches([ball])
+    removed.remove()
+    ball.set_velocity(2, 0, 0)
+    for _ in range(100):
+        world.step(0.005, 10, 10)
+    assert remaining.touched
+    assert len(remaining) == 1

@@ -198,6 +198,37 @@ def test_jammed_body_is_reported_and_a_free_one_is_not() -> None:
     assert limited == [(body.id,)] * 200
 
 
+def test_jammed_box_among_round_walls_is_reported() -> None:
+    # The box is the first body of its contacts, unlike a circle between edges.
+    world = PhysicsWorld()
+    walls = world.create_body("static", (0, 0, 0))
+    for place in [(0, -0.13), (-0.22, -0.05), (-0.07, 0.16), (0.07, -0.14)]:
+        walls.create_circle(place, 0.05, density=0)
+    body = world.create_body("dynamic", (0, 0, 0.3))
+    body.create_polygon([(-0.2, -0.2), (0.2, -0.2), (0.2, 0.2), (-0.2, 0.2)], density=10)
+    robot = Robot(body, 0.3, 0.4)
+    for _ in range(100):
+        robot.drive()
+        report = world.step(*STEP)
+        assert report is not None
+        assert report.limited == (body.id,)
+
+
+def test_the_end_of_a_long_lever_accelerates_a_body() -> None:
+    world = PhysicsWorld()
+    # The lever turns about a point that is opposite to the body, as seen from the origin.
+    lever = world.create_body("kinematic", (-4, 0, 0))
+    lever.create_polygon([(0, -0.1), (8.2, -0.1), (8.2, 0.1), (0, 0.1)], density=1)
+    ball = world.create_body("dynamic", (4, 0.4, 0))
+    ball.create_circle((0, 0), 0.2, density=1)
+    lever.set_velocity(0, 0, 1)
+    speeds = []
+    for _ in range(30):
+        assert world.step(*STEP) is None
+        speeds.append(math.hypot(*ball.velocity[:2]))
+    assert max(speeds) == pytest.approx(8.0, rel=0.05)
+
+
 def test_forces_may_make_a_body_faster() -> None:
     world = PhysicsWorld()
     body = world.create_body("dynamic", (0, 0, 0))

@@ -82,7 +82,7 @@ def flood():
 
 def on_scan(scan):
     global count
-    if goal is None or mode == "silent" or (mode in ("stops", "aborts") and count > 5):
+    if goal is None or mode in ("silent", "ends") or (mode in ("stops", "aborts") and count > 5):
         return
     count += 1
     if mode == "aborts" and count > 5:
