@@ -198,6 +198,22 @@ def test_jammed_body_is_reported_and_a_free_one_is_not() -> None:
     assert limited == [(body.id,)] * 200
 
 
+def test_a_body_that_stays_jammed_is_solved_once_and_tried_again_every_20_steps() -> None:
+    world = PhysicsWorld()
+    world.record_contacts = True
+    world.create_body("static", (0, 0, 0)).create_edges(POCKET)
+    body = world.create_body("dynamic", (0, 0, 1.0353632))
+    body.create_circle((0, 0), 0.2, density=10)
+    robot = Robot(body, 0.3, 0.4)
+    events = []
+    for _ in range(60):
+        robot.drive()
+        world.step(*STEP)
+        events.append(len(world.take_contact_events()))
+    assert min(events[:10]) > 100
+    assert [step for step in range(10, 60) if events[step] > 10] == [20, 40]
+
+
 def test_jammed_box_among_round_walls_is_reported() -> None:
     # The box is the first body of its contacts, unlike a circle between edges.
     world = PhysicsWorld()
