@@ -81,6 +81,7 @@ def test_the_colours_follow_the_scheme(report: Chromium, request: pytest.Fixture
     assert is_dark == ("dark" in request.node.name)
 
 
+@pytest.mark.parametrize("report", ["light"], indirect=True)
 def test_runs_are_drawn_with_walls_path_and_events(report: Chromium) -> None:
     boxes = "[...document.querySelectorAll('article svg .track')].map(e => e.getBBox().width)"
     assert all(width > 100 for width in report.evaluate(boxes))
@@ -92,6 +93,7 @@ def test_runs_are_drawn_with_walls_path_and_events(report: Chromium) -> None:
     assert report.evaluate("document.querySelector('span.worse').textContent") == "worse"
 
 
+@pytest.mark.parametrize("report", ["light"], indirect=True)
 def test_the_page_is_not_wider_than_a_phone(report: Chromium) -> None:
     report.resize(*PHONE, touch=True)
     try:
