@@ -393,3 +393,15 @@ def test_a_copy_takes_densities_frictions_and_shapes_back(world: PhysicsWorld) -
         world.become_copy_of(saved)
         assert body.fixtures[0].radius == 0.5
         assert body.mass == pytest.approx(math.pi / 4)
+
+
+def test_motions_of_several_bodies_are_read_in_one_call() -> None:
+    world = PhysicsWorld()
+    bodies = [world.create_body("dynamic", (1.5 * i, -i, 0.25 * i)) for i in range(3)]
+    for i, body in enumerate(bodies):
+        body.create_circle((0.0, 0.0), 0.1, density=1.0)
+        body.set_velocity(1.0 + i, 2.0 * i, -0.5 * i)
+    # A new array may contain anything.
+    for chosen in (bodies, bodies[::-1], bodies[2:]):
+        expected = [[*body.pose, *body.velocity] for body in chosen]
+        assert world.motions(chosen).tolist() == expected

@@ -63,6 +63,17 @@ class TestDriving:
             assert (vx, vy) == pytest.approx((v * math.cos(0.6), v * math.sin(0.6)), abs=1e-5)
             assert omega == pytest.approx(0.0, abs=1e-6)
 
+    def test_a_center_of_mass_beside_the_wheels_follows_at_once_without_limits(
+        self, robot: Any
+    ) -> None:
+        world = robot(
+            diff("max_force: 1.0e6, max_torque: 1.0e6, friction: .inf"),
+            bodies=DISC.replace("radius", "center: [0.3, 0.1], radius"),
+        )
+        drive(world, 1.0, 0.5)
+        world.step()
+        assert base(world).velocity == pytest.approx((1.0, 0.0, 0.5), abs=1e-3)
+
     @pytest.mark.parametrize("share", [1.0, 0.01])  # of the mass
     def test_constant_torque_up_to_the_target(self, robot: Any, share: float) -> None:
         world = robot(
