@@ -6,8 +6,8 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-import forked_ros
 import pytest
+from forked_ros import Forks
 from free_ports import free_port
 from programs import Program
 
@@ -63,16 +63,12 @@ def ros_programs(
     """A folder of programs of ROS that start faster than those that are installed."""
     pytest.importorskip("rosservice", reason="ROS is not installed")
     folder = tmp_path_factory.mktemp("ros")
-    socket = folder / "socket"
-    server = Program(
-        [sys.executable, forked_ros.__file__, socket], env=new_environment(folder), cwd=folder
-    )
-    server.wait_for_line("ready")
+    forks = Forks(folder, new_environment(folder))
     programs = folder / "bin"
     programs.mkdir()
-    forked_ros.write_programs(programs, socket)
+    forks.write_programs(programs)
     yield programs
-    server.stop()
+    forks.stop()
 
 
 @pytest.fixture

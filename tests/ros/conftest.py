@@ -21,10 +21,10 @@ from free_ports import free_port
 pytest.importorskip("rospy", reason="ROS is not installed")
 pytest.importorskip("flatland.msg", reason="the messages are not built")
 
-import forked_ros
 import rosgraph
 import roslib.packages
 import rospy
+from forked_ros import Forks
 from message_queue import MessageQueue
 from plugin_manifests import write_plugins
 from programs import Program
@@ -294,23 +294,20 @@ def server_path(ros_environment: dict[str, str]) -> str:
 @pytest.fixture(scope="session")
 def forks(
     ros_environment: dict[str, str], tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Path]:
-    """The socket of a process that forks programs."""
-    address = tmp_path_factory.mktemp("forks") / "socket"
-    process = Program([sys.executable, forked_ros.__file__, address], env=ros_environment)
-    process.wait_for_line("ready")
-    yield address
-    process.stop()
+) -> Iterator[Forks]:
+    """A process that forks programs."""
+    forks = Forks(tmp_path_factory.mktemp("forks"), ros_environment)
+    yield forks
+    forks.stop()
 
 
 class Launcher:
     """Starts and stops nodes and launch files."""
 
-    def __init__(self, environment: dict[str, str], server: str, forks: Path) -> None:
+    def __init__(self, environment: dict[str, str], server: str, forks: Forks) -> None:
         self.environment = environment
         self._server = server
         self._forks = forks
-        self._own_environment = environment  # that of the process that forks
         self._processes: list[Program] = []
 
     def add_plugins(self, folder: Path, source: str, module: str) -> None:
@@ -320,11 +317,10 @@ class Launcher:
 
     def program(self, *command: str, **environment: str) -> Program:
         """Starts a program."""
-        process, env = None, {**self.environment, **environment}
-        if forked_ros.can_fork(command, env, self._own_environment):
-            process = forked_ros.ForkedProcess(self._forks, command, env=env)
-        self._processes.append(Program(command, env=env, process=process))
-        return self._processes[-1]
+        environment = {**self.environment, **environment}
+        process = Program(command, env=environment, process=self._forks.start(command, environment))
+        self._processes.append(process)
+        return process
 
     def node(self, *arguments: str) -> Program:
         """Starts a server with a command line."""
@@ -381,7 +377,7 @@ def wait_until_server_is_ready(process: Program) -> None:
 
 
 @pytest.fixture
-def launcher(ros_master: dict[str, str], server_path: str, forks: Path) -> Iterator[Launcher]:
+def launcher(ros_master: dict[str, str], server_path: str, forks: Forks) -> Iterator[Launcher]:
     """Starts nodes that are stopped at the end of the test."""
     launcher = Launcher(ros_master, server_path, forks)
     yield launcher
@@ -390,7 +386,7 @@ def launcher(ros_master: dict[str, str], server_path: str, forks: Path) -> Itera
 
 @pytest.fixture(scope="module")
 def module_launcher(
-    ros_master: dict[str, str], server_path: str, forks: Path
+    ros_master: dict[str, str], server_path: str, forks: Forks
 ) -> Iterator[Launcher]:
     """Starts nodes that are stopped at the end of the file."""
     launcher = Launcher(ros_master, server_path, forks)

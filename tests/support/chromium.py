@@ -100,7 +100,7 @@ requestAnimationFrame(() => done(find()));
 
 def missing_programs() -> list[str]:
     """Returns the required programs that are not installed."""
-    return [name for name in (_BROWSER,) if shutil.which(name) is None]
+    return [] if shutil.which(_BROWSER) else [_BROWSER]
 
 
 class JavaScriptError(Exception):

@@ -77,14 +77,10 @@ class DevTools:
         if session:
             message["sessionId"] = session
         end = time.monotonic() + _TIMEOUT
-        try:
+        with contextlib.suppress(BrokenPipeError):  # found by `_receive`
             _write(self._output, json.dumps(message).encode() + b"\0")
-            while (response := self._receive(end)).get("id") != self._number:
-                self._on_event(response)
-        except (OSError, EOFError) as error:
-            self.kill()
-            log = self._log.read_text(errors="replace")[-_LOG_SIZE:]
-            raise RuntimeError(f"{method}: {error!r}\n{self._log}:\n{log}") from error
+        while (response := self._receive(end)).get("id") != self._number:
+            self._on_event(response)
         if "error" in response:
             raise DevToolsError(f"{method}: {response['error']['message']}")
         return response["result"]
@@ -93,14 +89,11 @@ class DevTools:
         """Receives events until a condition holds that depends on them.
 
         Raises:
-            RuntimeError: The browser has ended, or the condition does not hold within some time.
+            RuntimeError: As `call`, also if the condition does not hold within some time.
         """
         end = time.monotonic() + _TIMEOUT
-        try:
-            while not is_done():
-                self._on_event(self._receive(end))
-        except (OSError, EOFError) as error:
-            raise RuntimeError(f"{self._log}: {error!r}") from error
+        while not is_done():
+            self._on_event(self._receive(end))
 
     def _receive(self, end: float) -> Any:
         """Returns the next message."""
@@ -108,12 +101,18 @@ class DevTools:
         while b"\0" not in self._received:
             parts.append(self._received)
             if not select.select([self._input], [], [], max(end - time.monotonic(), 0.0))[0]:
-                raise TimeoutError(f"no message within {_TIMEOUT:g} s")
+                raise self._failure(f"the browser does not respond within {_TIMEOUT:g} s")
             self._received = os.read(self._input, 1 << 20)
             if not self._received:
-                raise EOFError("the browser has ended")
+                raise self._failure("the browser has ended")
         last, _, self._received = self._received.partition(b"\0")
         return json.loads(b"".join([*parts, last]))
+
+    def _failure(self, reason: str) -> RuntimeError:
+        """Ends the browser, and returns an exception with its log."""
+        self.kill()
+        log = self._log.read_text(errors="replace")[-_LOG_SIZE:]
+        return RuntimeError(f"{reason}\n{self._log}:\n{log}")
 
     def close(self) -> None:
         """Ends the browser."""

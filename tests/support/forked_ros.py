@@ -55,26 +55,49 @@ _LONGEST_MESSAGE: Final = 1 << 18  # bytes
 _PR_SET_NAME: Final = 15  # of prctl(2)
 
 
-def write_programs(folder: Path, address: Path) -> None:
-    """Writes the programs for a socket to a folder, which is then the first one of `PATH`."""
-    for name in ("rosservice", "rostopic", "rosversion"):
-        (folder / name).write_text(_CLIENT.format(python=sys.executable, address=str(address)))
-        (folder / name).chmod(0o755)
+class Forks:
+    """The process that forks."""
 
+    def __init__(self, folder: Path, environment: Mapping[str, str]) -> None:
+        """Starts the process.
 
-def can_fork(
-    command: Sequence[str], environment: Mapping[str, str], own: Mapping[str, str]
-) -> bool:
-    """Returns whether a fork is equivalent to a start of a program.
+        Args:
+            folder: Folder for its socket, and its working folder.
+            environment: All environment variables of the process.
+        """
+        # Not above, because the process itself would import pytest.
+        from programs import Program
 
-    Args:
-        command: The program and its arguments.
-        environment: The environment of the program.
-        own: The environment of the process that forks.
-    """
-    changed = dict(environment.items() ^ own.items())
-    is_known = Path(command[0]).name in _FUNCTIONS
-    return is_known and not any(name.startswith(("PYTHON", "LD_")) for name in changed)
+        self._environment = environment
+        self._address = folder / "socket"
+        command = [sys.executable, __file__, self._address]
+        self._process = Program(command, env=environment, cwd=folder)
+        self._process.wait_for_line("ready")
+
+    def stop(self) -> None:
+        """Stops the process."""
+        self._process.stop()
+
+    def write_programs(self, folder: Path) -> None:
+        """Writes programs that fork to a folder, which is then the first one of `PATH`."""
+        text = _CLIENT.format(python=sys.executable, address=str(self._address))
+        for name in ("rosservice", "rostopic", "rosversion"):
+            (folder / name).write_text(text)
+            (folder / name).chmod(0o755)
+
+    def start(self, command: Sequence[str], environment: Mapping[str, str]) -> ForkedProcess | None:
+        """Starts a program, unless only a new process can be equivalent.
+
+        Args:
+            command: The program and its arguments.
+            environment: All environment variables of the program.
+        """
+        changed = dict(environment.items() ^ self._environment.items())
+        if any(name.startswith(("PYTHON", "LD_")) for name in changed):
+            return None
+        if Path(command[0]).name not in _FUNCTIONS:
+            return None
+        return ForkedProcess(self._address, command, environment)
 
 
 class ForkedProcess:
@@ -83,33 +106,27 @@ class ForkedProcess:
     Attributes:
         pid: Process id.
         stdin: None; the standard input is empty.
-        stdout: What the program prints, None if it prints to another stream.
-        stderr: The same for its errors.
+        stdout: What the program prints.
+        stderr: What it prints to its standard error.
         returncode: The exit code, negative for a signal; None while the program runs.
     """
 
     def __init__(
-        self,
-        address: Path,
-        command: Sequence[str],
-        *,
-        env: Mapping[str, str],
-        cwd: Path | str | None = None,
+        self, address: Path, command: Sequence[str], environment: Mapping[str, str]
     ) -> None:
-        """Starts the program.
+        """Starts the program in the working folder of this process.
 
         Args:
             address: Socket of the process that forks.
             command: The program and its arguments.
-            env: All environment variables.
-            cwd: Working folder; None for that of this process.
+            environment: All environment variables.
         """
         self.returncode: int | None = None
         self.stdin: IO[str] | None = None
         self._receiving = threading.Lock()
         self._server = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._server.connect(str(address))
-        message = json.dumps([command, str(cwd or Path.cwd()), dict(env)]).encode()
+        message = json.dumps([command, str(Path.cwd()), dict(environment)]).encode()
         outputs = os.pipe(), os.pipe()
         streams = [os.open(os.devnull, os.O_RDONLY), *(writing for _, writing in outputs)]
         socket.send_fds(self._server, [message], streams)

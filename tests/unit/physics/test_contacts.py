@@ -360,7 +360,7 @@ def test_a_contact_is_stale_after_pre_solve(world: PhysicsWorld) -> None:
         kept[0].enabled = False
 
 
-def test_a_collector_goes_on_after_another_one_of_its_body_is_removed() -> None:
+def test_a_collector_continues_after_another_one_of_its_body_is_removed() -> None:
     world = PhysicsWorld()
     wall = world.create_body("static", (0, 0, 0))
     wall.create_edges(np.array([[1, -1, 1, 1]]))

@@ -29,6 +29,13 @@ ROUNDS = 25  # of changes and steps of a world
 SIDE = 12.0  # m, of the room
 
 
+def two_worlds() -> tuple[PhysicsWorld, PhysicsWorld]:
+    """Returns two worlds; the second one leaves all bodies to Box2D."""
+    worlds = PhysicsWorld(), PhysicsWorld()
+    worlds[1].pre_solve = lambda *_: None
+    return worlds
+
+
 class Pair:
     """Two worlds that receive the same calls; only one of them leaves all bodies to Box2D."""
 
@@ -36,8 +43,7 @@ class Pair:
         self.rng = random.Random(seed)
         # Kinematic bodies that leave their boxes are moved without the solver if all others are.
         self.kinds = ["dynamic", "kinematic"] + self.rng.choice((["dynamic"], ["kinematic"])) * 5
-        self.worlds = (PhysicsWorld(), PhysicsWorld())
-        self.worlds[1].pre_solve = lambda *_: None
+        self.worlds = two_worlds()
         for world in self.worlds:
             world.record_contacts = True
         self.bodies: list[tuple[PhysicsBody, ...]] = []
@@ -185,10 +191,7 @@ def test_a_moving_platform_pushes_a_body_in_every_direction(
 ) -> None:
     x, y = direction
     paths = []
-    for has_hook in (False, True):
-        world = PhysicsWorld()
-        if has_hook:
-            world.pre_solve = lambda *_: None
+    for world in two_worlds():
         platform = world.create_body("kinematic", (0, 0, 0))
         platform.create_polygon([(-0.2, -0.2), (0.2, -0.2), (0.2, 0.2), (-0.2, 0.2)], density=1)
         platform.set_velocity(x, y, 0)
@@ -214,10 +217,7 @@ def test_a_body_at_the_tolerance_of_sleep_falls_asleep(place: int, is_larger: bo
     velocity = [0.0, 0.0, 0.0]
     velocity[place] = float(np.nextafter(speed, np.float32(1)) if is_larger else speed)
     awake = []
-    for has_hook in (False, True):
-        world = PhysicsWorld()
-        if has_hook:
-            world.pre_solve = lambda *_: None
+    for world in two_worlds():
         body = world.create_body("dynamic", (0, 0, 0))
         body.create_circle((0, 0), 0.2, density=1)
         body.set_velocity(*velocity)

@@ -53,6 +53,15 @@ class Robot:
         )
 
 
+def jammed_robot(world: PhysicsWorld) -> tuple[Robot, PhysicsBody]:
+    """Returns a disc that is commanded to move in the pocket, and the walls of the pocket."""
+    walls = world.create_body("static", (0, 0, 0))
+    walls.create_edges(POCKET)
+    body = world.create_body("dynamic", (0, 0, 1.0353632))
+    body.create_circle((0, 0), 0.2, density=10)
+    return Robot(body, 0.3, 0.4), walls
+
+
 def random_edges(rng: np.random.Generator, center: tuple[float, float]) -> list[list[float]]:
     """Edges on a grid, and a few of any slope, within half a metre of a point."""
     count = int(rng.integers(3, 15))
@@ -101,20 +110,16 @@ def all_finite(bodies: list[PhysicsBody]) -> bool:
 
 def test_known_overflow_does_not_happen() -> None:
     with_edges = PhysicsWorld()
-    walls = with_edges.create_body("static", (0, 0, 0))
-    walls.create_edges(POCKET)
-    body = with_edges.create_body("dynamic", (0, 0, 1.0353632))
-    body.create_circle((0, 0), 0.2, density=10)
-    robot, far = Robot(body, 0.3, 0.4), bystander(with_edges)
+    (robot, walls), far = jammed_robot(with_edges), bystander(with_edges)
     for _ in range(1000):
         robot.drive()
         far.drive()
         with_edges.step(*STEP)
-        vx, vy, omega = body.velocity
+        vx, vy, omega = robot.body.velocity
         assert math.hypot(vx, vy) <= 0.31
         # All of 0.3 m/s and 0.4 rad/s turned into rotation; the inertia is that of a disc.
         assert abs(omega) <= 1.02 * math.hypot(0.4, 0.3 / (0.2 / math.sqrt(2))) + 0.1
-        assert all_finite([body, far.body, walls])
+        assert all_finite([robot.body, far.body, walls])
 
 
 # With Box2D alone these break the bound within 500 steps.
@@ -184,27 +189,20 @@ def test_fleet_that_overlaps_walls_stays_finite(seed: int) -> None:
 
 def test_jammed_body_is_reported_and_a_free_one_is_not() -> None:
     world = PhysicsWorld()
-    walls = world.create_body("static", (0, 0, 0))
-    walls.create_edges(POCKET)
-    body = world.create_body("dynamic", (0, 0, 1.0353632))
-    body.create_circle((0, 0), 0.2, density=10)
-    robot, far = Robot(body, 0.3, 0.4), bystander(world)
+    (robot, _), far = jammed_robot(world), bystander(world)
     limited = []
     for _ in range(200):
         robot.drive()
         far.drive()
         report = world.step(*STEP)
         limited.append(() if report is None else report.limited)
-    assert limited == [(body.id,)] * 200
+    assert limited == [(robot.body.id,)] * 200
 
 
 def test_a_body_that_stays_jammed_is_solved_once_and_tried_again_every_20_steps() -> None:
     world = PhysicsWorld()
     world.record_contacts = True
-    world.create_body("static", (0, 0, 0)).create_edges(POCKET)
-    body = world.create_body("dynamic", (0, 0, 1.0353632))
-    body.create_circle((0, 0), 0.2, density=10)
-    robot = Robot(body, 0.3, 0.4)
+    robot, _ = jammed_robot(world)
     events = []
     for _ in range(60):
         robot.drive()
