@@ -9,15 +9,20 @@ import os
 import signal
 import sys
 from collections.abc import Callable
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from flatland.ros.rospy_import import defer_catkin
 from flatland.viewer.restarts import STOP_SIGNALS, run_with_restarts, stop_signals_blocked
+
+if TYPE_CHECKING:
+    from flatland.viewer.rviz_panel import RvizPanel
 
 _LOG = logging.getLogger("flatland")
 NODE_NAME: Final = "flatland_viz"
 SIMULATOR_NODE_NAME: Final = "flatland_server"
 _USE_SIM_TIME: Final = "/use_sim_time"
+_BLANK_CHECKS: Final = 10
+_BLANK_CHECK_PERIOD: Final = 1000  # ms
 
 
 def main() -> int:
@@ -30,7 +35,7 @@ def main() -> int:
     return run_with_restarts(_run)
 
 
-def _run(disable_restarts: Callable[[], None]) -> int:
+def _run(disable_restarts: Callable[[], None], is_last_start: bool) -> int:
     defer_catkin()
     import rosgraph
     import rospy
@@ -60,7 +65,7 @@ def _run(disable_restarts: Callable[[], None]) -> int:
         # RViz reads the parameter only once, at its start, and server.launch may run later.
         rospy.set_param(_USE_SIM_TIME, True)
         _LOG.info("set %s to true, as server.launch does", _USE_SIM_TIME)
-    return _show_window(disable_restarts)
+    return _show_window(disable_restarts, is_last_start)
 
 
 def _startup_error() -> str:
@@ -106,7 +111,7 @@ def _display_error() -> str:
     return "" if has_glx else f"the display {name} has no OpenGL (GLX extension)"
 
 
-def _show_window(disable_restarts: Callable[[], None]) -> int:
+def _show_window(disable_restarts: Callable[[], None], is_last_start: bool) -> int:
     # A signal must not interrupt the initialization of RViz, which installs its own handlers. They
     # must not run in another thread either, where the signal would be lost.
     with stop_signals_blocked():
@@ -128,12 +133,37 @@ def _show_window(disable_restarts: Callable[[], None]) -> int:
         rospy.on_shutdown(app.quit)
         window.show()
         link.start()
+        if not is_last_start:
+            _crash_if_blank(window.rviz_panel)
         # Unblocked inside the event loop: `quit` has no effect before it runs.
         QTimer.singleShot(0, _unblock_stop_signals)
         app.exec_()
         disable_restarts()
     link.close()
     return 0
+
+
+def _crash_if_blank(panel: RvizPanel) -> None:
+    """Aborts this process if RViz draws nothing, which can happen at its start on a busy machine.
+
+    Nothing else reports it: Qt ignores errors of the X server.
+    """
+    from PyQt5.QtCore import QTimer
+
+    timer = QTimer(panel.widget)
+    # RViz draws several frames between two checks, however slow the machine is.
+    checks = iter(range(_BLANK_CHECKS))
+
+    def check() -> None:
+        has_picture = panel.has_picture()
+        if has_picture:
+            timer.stop()
+        elif has_picture is not None and next(checks, None) is None:
+            _LOG.error("RViz draws nothing")
+            os.abort()
+
+    timer.timeout.connect(check)
+    timer.start(_BLANK_CHECK_PERIOD)
 
 
 def _unblock_stop_signals() -> None:

@@ -32,7 +32,7 @@ def stop_signals_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)
 
 
-def run_with_restarts(run: Callable[[Callable[[], None]], int]) -> int:
+def run_with_restarts(run: Callable[[Callable[[], None], bool], int]) -> int:
     """Runs a function in a child process, and again if the process crashes.
 
     Stop signals are forwarded to the child, where they raise `SystemExit` unless the function has
@@ -40,8 +40,8 @@ def run_with_restarts(run: Callable[[Callable[[], None]], int]) -> int:
     are started.
 
     Args:
-        run: Returns an exit code. Its argument is a function that disables restarts, to be called
-            before the end.
+        run: Returns an exit code. Its arguments are a function that disables restarts, to be
+            called before the end, and whether this is the last start.
 
     Returns:
         In the child, the exit code of the function. In this process, the exit code of the child, or
@@ -66,7 +66,7 @@ def run_with_restarts(run: Callable[[Callable[[], None]], int]) -> int:
                 signal.signal(number, lambda *_: sys.exit(0))
             _end_with(parent)
             signal.pthread_sigmask(signal.SIG_UNBLOCK, waited)
-            return run(lambda: disabled.__setitem__(0, 1))
+            return run(lambda: disabled.__setitem__(0, 1), start == _MAX_STARTS)
         while (ended := os.waitpid(child, os.WNOHANG))[0] == 0:
             received = signal.sigwait(waited)
             if received in STOP_SIGNALS:

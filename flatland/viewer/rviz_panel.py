@@ -6,8 +6,8 @@ import tempfile
 from pathlib import Path
 from typing import Any, Final
 
-from PyQt5.QtCore import QPoint, QTimer
-from PyQt5.QtGui import QKeySequence
+from PyQt5.QtCore import QPoint, QRect, Qt, QTimer
+from PyQt5.QtGui import QImage, QKeySequence, QPixmap
 from PyQt5.QtWidgets import QAction, QMainWindow, QToolBar, QWidget
 
 from flatland.geometry import Vector2, rotate
@@ -81,6 +81,23 @@ class RvizPanel:
         self._reset_timer = QTimer(self.widget)
         self._reset_timer.timeout.connect(self._check_for_reset)
         self._reset_timer.start(round(1000 * _RESET_POLL_PERIOD))
+
+    def has_picture(self) -> bool | None:
+        """Whether anything is drawn: RViz clears the view to dark grey, so not all of it is black.
+
+        Returns:
+            None if this is unknown, because the screen does not show the window.
+        """
+        window = self.widget.window()
+        if not window.windowHandle().isExposed():
+            return None
+        # With the windows in it, unlike `QWidget.grab`: OGRE draws into one of its own.
+        pixmap = window.screen().grabWindow(window.winId())
+        scale = pixmap.devicePixelRatioF()
+        corner = self.render_panel.mapTo(window, QPoint(0, 0))
+        area = (corner.x(), corner.y(), self.render_panel.width(), self.render_panel.height())
+        view = QRect(*(round(scale * value) for value in area))
+        return None if _is_black(pixmap) else not _is_black(pixmap.copy(view))
 
     # -- time ------------------------------------------------------------------------------
 
@@ -202,6 +219,13 @@ class RvizPanel:
         )
         # RViz uses device pixels, Qt device-independent pixels.
         return (x, y), angle, scale / self.render_panel.devicePixelRatioF()
+
+
+def _is_black(pixmap: QPixmap) -> bool:
+    image = pixmap.toImage().convertToFormat(QImage.Format.Format_RGB32)
+    black = QImage(image.size(), image.format())
+    black.fill(Qt.GlobalColor.black)
+    return bool(image == black)
 
 
 def _find_render_panel(frame: QWidget) -> QWidget:

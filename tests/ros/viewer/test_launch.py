@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,24 @@ PROGRAM = shutil.which("flatland_viz") or "flatland_viz"
 BLUE, CYAN, RED = (0, 0, 255), (0, 255, 255), (255, 70, 70)
 # The 3-D view between RViz's panels; the icon of one of its tools is magenta as well.
 RVIZ_PANEL = {"x": 366, "y": 64, "width": 816, "height": 636}
+
+# A viewer whose view is black at the first start: without grid, on a black background.
+BLACK_AT_FIRST = """
+import sys
+from pathlib import Path
+from flatland.viewer import app, rviz_panel, window
+
+class Panel(rviz_panel.RvizPanel):
+    def __init__(self):
+        if not (started := Path(sys.argv[1])).exists():
+            started.touch()
+            for text, other in ("48; 48; 48", "0; 0; 0"), ("Alpha: 0.12", "Alpha: 0"):
+                rviz_panel._CONFIG = rviz_panel._CONFIG.replace(text, other)
+        super().__init__()
+
+window.RvizPanel = Panel
+sys.exit(app.main())
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -160,6 +179,18 @@ def test_viewer_starts_with_the_simulator_and_after_a_crash_and_can_be_closed_al
     assert "Traceback" not in launch.output
     assert ros.topic("/clock", Clock).take(20)
     assert launch.stop() == 0
+
+
+def test_viewer_starts_again_if_rviz_draws_nothing(
+    on_screen: Any, ros: Any, screen: Any, tmp_path: Path, eventually: Callable[..., Any]
+) -> None:
+    del ros
+    viewer = on_screen.program(sys.executable, "-c", BLACK_AT_FIRST, str(tmp_path / "started"))
+    viewer.wait_for_line("RViz draws nothing")
+    viewer.wait_for_line(r"RViz or OpenGL has crashed \(SIGABRT\); the viewer starts again")
+    eventually("grey view", lambda: (screen.picture() == 48).all(axis=2).mean() > 0.5)
+    viewer.send(signal.SIGINT)
+    assert viewer.wait() == 0
 
 
 def test_viewer_exits_on_a_signal_during_start(on_screen: Any) -> None:
