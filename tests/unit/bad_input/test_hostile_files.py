@@ -1,8 +1,7 @@
 """Files that are no files, huge, cyclic or programs: each ends, with at most 500 MB.
 
 They are loaded in one process without privileges, whose address space and processor time per file
-are limited. More expressions
-are in tests/unit/config/test_lua.py.
+are limited. More expressions are in tests/unit/config/test_lua.py.
 """
 
 from __future__ import annotations
@@ -89,10 +88,7 @@ SPECIAL: dict[str, tuple[Callable[[Path], object], str]] = {
     "folder": (lambda path: path.mkdir(), NOT_A_FILE),
     "broken link": (lambda path: path.symlink_to("nowhere"), "missing"),
     "missing": (lambda path: None, "missing"),
-    "link to itself": (
-        lambda path: path.symlink_to(path),
-        "Too many levels of symbolic links",
-    ),
+    "link to itself": (lambda path: path.symlink_to(path), "Too many levels of symbolic links"),
     "no permission": (unreadable, "Permission denied"),
     "100 MB": (holes, "it is larger than 64 MiB"),
 }

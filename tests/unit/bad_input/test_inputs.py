@@ -1,15 +1,17 @@
 """Invalid contents of files: the class of the error, its text, its line and its hint.
 
-`test_keys.py` generates the cases of single keys: missing, misspelled, of a wrong type or size. The
-parameters of plugins with a rule of their own are in the tests of the plugins, text that is not
-valid YAML and errors of `$include` are in the tests of `flatland.config`.
+Files that differ in one entry are in the table errors.txt, all others are here.
+
+`test_keys.py` generates the cases of single keys: missing, misspelled, of a wrong type or size.
+Text that is not valid YAML and errors of `$include` are in the tests of `flatland.config`.
 """
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,7 +27,6 @@ WHEEL = "{name: wheel, footprints: []}"
 ENDS = "[{name: base, anchor: [0, 0]}, {name: wheel, anchor: [0, 0]}]"
 PLACE = 'model "robot"'
 FOOTPRINT = f'{PLACE} body "base" "footprints" index=0'
-LASER = "type: Laser, body: base, range: 5, angle: {min: 0, max: 1, increment: 0.5}"
 
 
 @dataclass(frozen=True)
@@ -50,54 +51,78 @@ class Input:
     error_class: str = "YamlError"
 
 
-def model(text: str, error: str, line: int = 1, hint: str = "") -> Input:
-    return Input("model", text, f"Flatland YAML: {error}", line, hint)
+def model(text: str, error: str, hint: str = "") -> Input:
+    """Returns a model whose last line has an error."""
+    return Input("model", text, f"Flatland YAML: {error}", text.count("\n"), hint)
 
 
-def body(entries: str, error: str, hint: str = "") -> Input:
-    """Returns a model with one body that has further entries."""
-    return model(f"bodies:\n  - {{name: base, {entries}}}\n", error, 2, hint)
+def world(text: str, error: str, hint: str = "") -> Input:
+    """Returns a world whose last line has an error."""
+    return Input("world", text, f"Flatland YAML: {error}", text.count("\n"), hint)
 
 
-def footprint(entries: str, error: str, hint: str = "") -> Input:
-    """Returns a model with one footprint."""
-    return body(f"footprints: [{{{entries}}}]", error, hint)
+def plugin(start: str, error: str, hint: str = "", body: str = BODY) -> Input:
+    """Returns a model with a plugin; `start` begins with its type."""
+    text = f"bodies: [{body}]\nplugins:\n  - {{name: p, type: {start}}}\n"
+    name = f'Model Plugin "p" type "{start.split(",")[0]}" {PLACE}'
+    return Input("model", text, f"Flatland plugin: {name}: {error}", 3, hint, "PluginError")
 
 
-def polygon(points: str, error: str, hint: str = "") -> Input:
-    return footprint(f"type: polygon, density: 1, points: {points}", error, hint)
+def world_plugin(start: str, error: str, hint: str = "") -> Input:
+    """Returns a world with a plugin, and a robot on the line through the only wall."""
+    text = (
+        "properties: {}\nlayers: [{name: 2d, map: map.yaml}]\n"
+        "models: [{name: robot, model: good.model.yaml, pose: [5, 9, 0]}]\n"
+        f"plugins:\n  - {{name: w, type: {start}}}\n"
+    )
+    name = f'World Plugin "w" type "{start.split(",")[0]}"'
+    return Input("world", text, f"Flatland plugin: {name}: {error}", 5, hint, "PluginError")
 
 
-def joint(entries: str, error: str, hint: str = "") -> Input:
-    text = f"bodies: [{BODY}, {WHEEL}]\njoints:\n  - {{name: j, {entries}}}\n"
-    return model(text, error, 3, hint)
+JOINTED = f"bodies: [{BODY}, {WHEEL}]\njoints:\n"
+WORLD = "properties: {}\nlayers: "
+YAML = "Flatland YAML: "
+# By kind of a file, the place of its entry in errors, and the function that creates the input from
+# the entry, the error and the hint.
+KINDS: dict[str, tuple[str, Callable[..., Input]]] = {
+    "body": (
+        f'{PLACE} body "base"',
+        lambda entry, *rest: model(f"bodies:\n  - {{name: base, {entry}}}\n", *rest),
+    ),
+    "footprint": (
+        f'{PLACE} body "base" "footprints" index=0',
+        lambda entry, *rest: model(
+            f"bodies:\n  - {{name: base, footprints: [{{{entry}}}]}}\n", *rest
+        ),
+    ),
+    "joint": (
+        f'{PLACE} joint "j"',
+        lambda entry, *rest: model(f"{JOINTED}  - {{name: j, {entry}}}\n", *rest),
+    ),
+    "plugin": (f'{PLACE} plugin "p"', lambda entry, error, hint: plugin(entry, YAML + error, hint)),
+    "raising plugin": ("", plugin),
+    "layers": ('"layers" index=0', lambda entry, *rest: world(f"{WORLD}{entry}\n", *rest)),
+    "models": ("", lambda entry, *rest: world(f"{WORLD}[]\nmodels: [{entry}]\n", *rest)),
+    "world plugin": (
+        'world_plugin "w"',
+        lambda entry, error, hint: world_plugin(entry, YAML + error, hint),
+    ),
+    "raising world plugin": ("", world_plugin),
+}
 
 
-def plugin(type_name: str, entries: str, error: str, hint: str = "") -> Input:
-    text = f"bodies: [{BODY}]\nplugins:\n  - {{name: p, type: {type_name}, {entries}}}\n"
-    start = f'Flatland plugin: Model Plugin "p" type "{type_name}" {PLACE}: Flatland YAML: '
-    return Input("model", text, start + error, 3, hint, "PluginError")
-
-
-def laser(old: str, new: str, error: str, hint: str = "") -> Input:
-    return plugin("Laser", LASER.replace(old, new).removeprefix("type: Laser, "), error, hint)
-
-
-def world(text: str, error: str, line: int = 1, hint: str = "") -> Input:
-    return Input("world", text, f"Flatland YAML: {error}", line, hint)
-
-
-def layers(text: str, error: str, hint: str = "") -> Input:
-    return world(f"properties: {{}}\nlayers: {text}\n", error, 2, hint)
-
-
-def models(text: str, error: str, line: int = 3, hint: str = "") -> Input:
-    return world(f"properties: {{}}\nlayers: []\nmodels: [{text}]\n", error, line, hint)
-
-
-def world_plugin(text: str, error: str) -> Input:
-    entry = f"properties: {{}}\nlayers: []\nplugins:\n  - {{name: w, type: {text}}}\n"
-    return Input("world", entry, f"Flatland plugin: {error}", 4, "", "PluginError")
+def read_table() -> Iterator[tuple[str, Input]]:
+    """Yields the names and inputs of errors.txt."""
+    text = Path(__file__).with_name("errors.txt").read_text()
+    for block in re.split(r"\n(?=\w)", text.split("\n", 3)[3].rstrip()):
+        head, *rows = re.split(r"\n  (?! )", block)
+        kind, _, start = head.partition(":")
+        for row in rows:
+            entry, error, *hint = (line.strip() for line in row.split("\n"))
+            entry = f"{start.strip()}, {entry}" if start else entry
+            place, create = KINDS[kind]
+            hint_text = "".join(hint).removeprefix("hint: ")
+            yield f"{kind}: {entry}", create(entry, error.replace("@", place), hint_text)
 
 
 def image_map(error: str, line: int, **keys: str) -> Input:
@@ -117,340 +142,83 @@ def line_map(scale: str, error: str) -> Input:
     return Input("map", text, f'Flatland YAML: Invalid "scale", {error} (in layer "2d")', 3)
 
 
-NO_BODIES = 'Invalid "bodies" in "robot" model, must be a list of bodies of at least size 1'
-TWO_ITEMS = f'Invalid "bodies" in {PLACE} joint "j", must be a sequence of exactly two items'
-RANGE = 'Invalid "range", must be greater than 0 and at most 1e+06 m, got '
-NINE_POINTS = f"[{', '.join(['[0, 0]'] * 9)}]"
-NO_BODY = ('Body with name "bas" does not exist', 'did you mean "base"?')
+NO_BODY = f'{YAML}Body with name "bas" does not exist'
+ON_A_BODY = ("DiffDrive", "Gps", "Imu", "Tween", "BoolSensor", "PosePublisher", "TricycleDrive")
+NO_FORCE = f'{YAML}"mode: force" requires a dynamic body with a mass, but body "base"'
+FORCE = "DiffDrive, body: base, mode: force, max_force: 1, max_torque: 1"
 TWO_WHEELS = f"bodies:\n  - {WHEEL}\n  - {WHEEL}\n"
 TWO_JOINTS = f"  - {{name: j, type: weld, bodies: {ENDS}}}\n" * 2
 TWO_PLUGINS = "  - {name: p, type: ModelTfPublisher}\n" * 2
 NO_WHEEL = f"[{BODY}, {{name: wheel, footprints: [], enabled: false}}]"
-FIFTEEN = ", ".join(f"l{number}" for number in range(15))
-SEVENTEEN = ", ".join(f"n{number}" for number in range(17))
-RANGES = {"0": "0.0", "-1": "-1.0", ".nan": "nan", ".inf": "inf", "1e308": "1e+308"}
 INPUTS: dict[str, Input] = {
+    **dict(read_table()),
     # Models.
-    "no bodies": model("bodies: []\n", NO_BODIES),
-    "all bodies disabled": body("footprints: [], enabled: false", NO_BODIES),
+    "no bodies": model(
+        "bodies: []\n",
+        'Invalid "bodies" in "robot" model, must be a list of bodies of at least size 1',
+    ),
     "body twice": model(
-        TWO_WHEELS, 'Invalid "bodies" in "robot" model, body with name "wheel" already exists', 3
-    ),
-    "body type": body(
-        "footprints: [], type: dynamik",
-        f'Invalid "type" in {PLACE} body "base", must be one of: static, kinematic, dynamic',
-        'did you mean "dynamic"?',
-    ),
-    "footprint type": footprint(
-        "type: box, density: 1",
-        f'Invalid footprint "type" in {FOOTPRINT}, support footprints are: circle, polygon',
-        'did you mean "polygon"?',
-    ),
-    "footprint layers": footprint(
-        "type: circle, radius: 1, density: 1, layers: [2d, 5d, 6d]",
-        f'Invalid footprint "layers" in {FOOTPRINT}, {{5d,6d}} layer(s) does not exist',
-        "layers of the world: 2d, 3d",
-    ),
-    "points of a circle": footprint(
-        "type: circle, radius: 1, density: 1, points: []",
-        f'Entry index=0 contains unrecognized entry(s) {{"points"}} (in {PLACE} body "base" '
-        '"footprints")',
-        "other keys that are known here: center, collision, friction, layers, material, "
-        "restitution, sensor",
-    ),
-    "transmission and specular": footprint(
-        "type: circle, radius: 1, density: 1, material: {transmission: 0.5, specular: 0.6}",
-        'Invalid "specular", transmission + specular must be at most 1, got 0.5 + 0.6 '
-        f'(in {FOOTPRINT} "material")',
-    ),
-    "two points": polygon(
-        "[[0, 0], [1, 0]]", f'Entry "points" must have size >= 3 (in {FOOTPRINT})'
-    ),
-    "nine points": polygon(NINE_POINTS, f'Entry "points" must have size <= 8 (in {FOOTPRINT})'),
-    "point of three": polygon(
-        "[[0, 0], [1, 0], [1, 1, 1]]",
-        f'Error converting entry index=2 to vector (in {FOOTPRINT} "points")',
-        hint="two numbers are written as [x, y]",
-    ),
-    "point with NaN": polygon(
-        "[[0, 0], [1, .nan], [0, 1]]",
-        'Invalid "points", must be finite, got [(0.0, 0.0), (1.0, nan), (0.0, 1.0)] '
-        f"(in {FOOTPRINT})",
-    ),
-    "collinear points": polygon(
-        "[[0, 0], [1, 0], [2, 0]]",
-        f"Invalid entry in {FOOTPRINT}, a polygon must have a positive area, but its points are "
-        "collinear",
-    ),
-    "radius 1e308": footprint(
-        "type: circle, radius: 1e308, density: 1",
-        f"Invalid entry in {FOOTPRINT}, radius must be finite and within +-1e+09, got 1e+308",
-    ),
-    "pose 1e308": body(
-        "footprints: [], pose: [1e308, 0, 0]",
-        f'Invalid entry in {PLACE} body "base", '
-        "pose must be finite and within +-1e+09, got (1e+308, 9)",
-    ),
-    "joint type": joint(
-        f"type: hinge, bodies: {ENDS}",
-        f'Invalid joint "type" in {PLACE} joint "j", supported joints are: revolute, weld',
-        'did you mean "revolute"?',
-    ),
-    "joint of one body": joint("type: weld, bodies: [{name: base, anchor: [0, 0]}]", TWO_ITEMS),
-    "joint without bodies": joint("type: weld, bodies: []", TWO_ITEMS),
-    "joint of an unknown body": joint(
-        f"type: weld, bodies: {ENDS.replace('wheel', 'wheeel')}",
-        f'Cannot find body with name "wheeel" in {PLACE} joint "j" "bodies" index=1',
-        'did you mean "wheel"?',
+        TWO_WHEELS, 'Invalid "bodies" in "robot" model, body with name "wheel" already exists'
     ),
     "joint of a disabled body": model(
         f"bodies: {NO_WHEEL}\njoints:\n  - {{name: j, type: weld, bodies: {ENDS}}}\n",
         f'Cannot find body with name "wheel" in {PLACE} joint "j" "bodies" index=1',
-        3,
         "bodies of the model: base",
-    ),
-    "joint of a body with itself": joint(
-        f"type: weld, bodies: {ENDS.replace('wheel', 'base')}",
-        f'Invalid entry in {PLACE} joint "j", a joint must connect two different bodies',
-    ),
-    "anchor 1e308": joint(
-        f"type: weld, bodies: {ENDS.replace('[0, 0]', '[1e308, 0]')}",
-        f'Invalid entry in {PLACE} joint "j", '
-        "anchor_a must be finite and within +-1e+09, got (1e+308, 0)",
-    ),
-    "limits in the wrong order": joint(
-        f"type: revolute, bodies: {ENDS}, limits: [1, -1]",
-        'Invalid "limits", the lower limit 1.0 must not be above the upper limit -1.0 '
-        f'(in {PLACE} joint "j")',
-    ),
-    "limits of a weld": joint(
-        f"type: weld, bodies: {ENDS}, limits: [-1, 1]",
-        f'Entry joint "j" contains unrecognized entry(s) {{"limits"}} (in {PLACE})',
-        "other keys that are known here: angle, collide_connected, color, damping, enabled, "
-        "frequency",
-    ),
-    "angle of a revolute joint": joint(
-        f"type: revolute, bodies: {ENDS}, frequency: 2, angle: 1",
-        f'Entry joint "j" contains unrecognized entry(s) {{"angle", "frequency"}} (in {PLACE})',
-        "other keys that are known here: collide_connected, color, enabled, limits",
     ),
     "joint twice": model(
         f"bodies: [{BODY}, {WHEEL}]\njoints:\n{TWO_JOINTS}",
         'Invalid "joints" in "robot" model, joint with name "j" already exists',
-        4,
     ),
     "plugin twice": model(
         f"bodies: [{BODY}]\nplugins:\n{TWO_PLUGINS}",
         'Invalid "plugins" in "robot" model, plugin with name "p" already exists',
-        4,
     ),
     # Plugins.
-    "Laser increment 0": laser(
-        "increment: 0.5", "increment: -0", 'Invalid "angle" params, increment must not be zero!'
-    ),
-    "Laser max < min": laser(
-        "max: 1", "max: -1", 'Invalid "angle" params, must have max > min when increment > 0'
-    ),
-    "Laser min < max": laser(
-        "increment: 0.5",
-        "increment: -0.5",
-        'Invalid "angle" params, must have min > max when increment < 0',
-    ),
-    "Laser angle NaN": laser(
-        "max: 1", "max: .nan", 'Invalid "angle" params, must be finite, got [0.0, nan, 0.5]'
-    ),
-    "Laser increment inf": laser(
-        "increment: 0.5",
-        "increment: .inf",
-        'Invalid "angle" params, must be finite, got [0.0, 1.0, inf]',
-    ),
-    "Laser with too many beams": laser(
-        "increment: 0.5",
-        "increment: 1e-300",
-        'Invalid "angle" params, more than 1000000 beams between 0.0 and 1.0 in steps of 1e-300',
-    ),
     **{
-        f"Laser range {text}": laser("range: 5", f"range: {text}", RANGE + got)
-        for text, got in RANGES.items()
-    },
-    "Laser layers": laser(
-        "range: 5",
-        "layers: [a, 2d, b], range: 5",
-        "Cannot find layer(s): {a,b}",
-        "layers of the world: 2d, 3d",
-    ),
-    "Laser no_hit": laser(
-        "range: 5",
-        "no_hit: zero, range: 5",
-        'Invalid "no_hit", must be one of: nan, inf, range, got zero',
-    ),
-    **{
-        f"{name} of an unknown body": plugin(name, f"{key}: bas{more}", *NO_BODY)
-        for name, key, more in (
-            ("Laser", "body", ", range: 5, angle: {min: 0, max: 1, increment: 1}"),
-            ("DiffDrive", "body", ""),
-            ("Gps", "body", ""),
-            ("Imu", "body", ""),
-            ("Tween", "body", ""),
-            ("BoolSensor", "body", ""),
-            ("PosePublisher", "body", ""),
-            ("TricycleDrive", "body", ""),
-            ("WheelStates", "wheels: [{name: w, radius: 1}], body", ""),
-            ("ModelTfPublisher", "reference", ""),
+        entry: plugin(entry, NO_BODY, 'did you mean "base"?')
+        for entry in (
+            *(f"{name}, body: bas" for name in ON_A_BODY),
+            "Laser, body: bas, range: 5, angle: {min: 0, max: 1, increment: 1}",
+            "WheelStates, wheels: [{name: w, radius: 1}], body: bas",
+            "ModelTfPublisher, reference: bas",
+            "ModelTfPublisher, exclude: [base, bas]",
+            "Bumper, exclude: [base, bas]",
         )
     },
-    "Bumper excludes an unknown body": plugin("Bumper", "exclude: [base, bas]", *NO_BODY),
-    "ModelTfPublisher excludes an unknown body": plugin(
-        "ModelTfPublisher", "exclude: [base, bas]", *NO_BODY
+    "covariance of NaN": plugin(
+        f"DiffDrive, body: base, odom_twist_covariance: [{', '.join(['.nan'] * 36)}]",
+        f'{YAML}Invalid "odom_twist_covariance", must not hold NaN (in {PLACE} plugin "p")',
     ),
-    "TricycleDrive of an unknown joint": plugin(
-        "TricycleDrive",
-        "body: base, front_wheel_joint: f, rear_left_wheel_joint: l, rear_right_wheel_joint: r",
-        'Joint with name "f" does not exist',
-        "joints of the model: none",
+    "force of a kinematic body": plugin(
+        FORCE, f"{NO_FORCE} is kinematic", body=BODY.replace("base,", "base, type: kinematic,")
     ),
-    "Tween mode": plugin(
-        "Tween",
-        "body: base, mode: jump",
-        "Mode jump does not exist",
-        "modes: yoyo, loop, once, trigger",
-    ),
-    "Tween easing": plugin(
-        "Tween",
-        "body: base, easing: Linear",
-        "Easing Linear does not exist",
-        'did you mean "linear"?',
-    ),
-    "Tween duration 0": plugin(
-        "Tween",
-        "body: base, duration: 0",
-        'Invalid "duration", must be greater than 0, got 0.0',
-    ),
-    "Gps at 91 degrees": plugin(
-        "Gps", "body: base, ref_lat: 91", 'Invalid "ref_lat", must be from -90 to 90, got 91.0'
-    ),
-    "Imu with both rates": plugin(
-        "Imu",
-        "body: base, update_rate: 5, pub_rate: 5",
-        'Invalid "pub_rate", the older spelling of "update_rate", must not be combined with it',
-    ),
-    "PosePublisher of another message": plugin(
-        "PosePublisher",
-        "message: tf",
-        'Invalid "message", must be one of: pose, odometry, got tf',
-    ),
-    "PosePublisher of a pose with a child frame": plugin(
-        "PosePublisher",
-        "child_frame_id: base",
-        'Invalid "child_frame_id", only used with "message: odometry"',
-    ),
-    "Dummy with another float": plugin(
-        "DummyModelPlugin",
-        "dummy_param_float: 0.5, dummy_param_string: dummy_test_123456, dummy_param_int: 123456",
-        'Invalid "dummy_param_float", must be 0.123456, got 0.5',
-    ),
-    "Dummy with another text": plugin(
-        "DummyModelPlugin",
-        "dummy_param_float: 0.123456, dummy_param_string: x, dummy_param_int: 123456",
-        'Invalid "dummy_param_string", must be dummy_test_123456, got x',
-    ),
-    "Dummy with another number": plugin(
-        "DummyModelPlugin",
-        "dummy_param_float: 0.123456, dummy_param_string: dummy_test_123456, dummy_param_int: 7",
-        'Invalid "dummy_param_int", must be 123456, got 7',
+    "force of a body without a mass": plugin(
+        FORCE, f"{NO_FORCE} has none", body="{name: base, footprints: []}"
     ),
     # Worlds.
     "a list": world("[a]\n", "Entry must be a map"),
     "a text": world("text\n", "Entry must be a map"),
     "two unknown keys": world(
-        "{properties: {}, layers: [], b: 1, a: 2}",
+        "{properties: {}, layers: [], b: 1, a: 2}\n",
         'Entry contains unrecognized entry(s) {"a", "b"}',
-        hint="other keys that are known here: models, plugins",
-    ),
-    "layer without a map": layers(
-        "[2d]",
-        'Entry index=0 must be a map (in "layers")',
-        "a layer is written as {name: walls, map: map.yaml}",
-    ),
-    "second layer": layers(
-        "[{name: L}, {name: [K, J], color: red}]",
-        'Entry "color" must be a list (in "layers" index=1)',
-        "[r, g, b, a], each from 0 to 1",
-    ),
-    "layer twice": layers("[{name: 2d}, {name: [3d, 2d]}]", 'Layer with name "2d" already exists'),
-    "layer alias twice": layers("[{name: [b, b]}]", 'Layer with name "b" already exists'),
-    "17 layers": layers(
-        f"[{{name: [{SEVENTEEN}]}}]",
-        f"Unable to add 17 additional layer(s) {{{SEVENTEEN}}}, current layers count is 0, max "
-        "allowed is 16",
-    ),
-    "two layers beside 15": layers(
-        f"[{{name: [{FIFTEEN}]}}, {{name: [a, b]}}]",
-        "Unable to add 2 additional layer(s) {a, b}, current layers count is 15, max allowed is 16",
-    ),
-    "class of a layer": layers(
-        "[{name: 2d, class: ''}]", 'Invalid "class", must not be empty (in "layers" index=0)'
+        "other keys that are known here: models, plugins",
     ),
     "published map": world(
         "layers: [{name: [a, c]}, {name: b}]\nproperties:\n  publish_map: roof\n",
         'Invalid "publish_map", must be the name of a layer (a, b), got roof (in "properties")',
-        3,
     ),
     "published map without layers": world(
         "layers: []\nproperties: {publish_map: roof}\n",
         'Invalid "publish_map", must be the name of a layer (none), got roof (in "properties")',
-        2,
     ),
-    "model twice": models(
-        "{name: m, model: good.model.yaml},\n{name: m, model: good.model.yaml}",
+    "model twice": world(
+        f"{WORLD}[]\nmodels:\n" + "  - {name: m, model: good.model.yaml}\n" * 2,
         'Model with name "m" already exists',
-        4,
-    ),
-    "illegal namespace": models(
-        "{name: m, model: good.model.yaml, namespace: my robot}",
-        'failed to spawn model "m", namespace "my robot" is not a legal ROS name: '
-        'it must start with a letter and hold only letters, digits, "_" and "/"',
-    ),
-    "empty model name": models(
-        "{name: '', model: good.model.yaml}",
-        "failed to spawn model, its name must not be empty",
-    ),
-    "empty model path": models(
-        "{name: m, model: ''}", 'failed to spawn model "m", the path must not be empty'
-    ),
-    "map of an invalid topic": layers(
-        "[{name: a, map: 'topic://my map'}]",
-        'Invalid "map", "my map" is not a legal topic name: it must start with a letter or "/" and '
-        'hold only letters, digits, "_" and "/", expected topic:///map (in "layers" index=0)',
-    ),
-    "missing map": layers(
-        "[{name: a, map: nothing.map.yaml}]",
-        'File does not exist, path="{folder}/nothing.map.yaml"',
-    ),
-    "missing model": models(
-        "{name: m, model: god.model.yaml}",
-        'File does not exist, path="{folder}/god.model.yaml"',
-        hint='did you mean "good.model.yaml"?',
-    ),
-    "model of an unknown user": models(
-        "{name: m, model: ~no-such-user/m.yaml}",
-        'File does not exist, path="{folder}/~no-such-user/m.yaml"',
-        hint='the folder "{folder}/~no-such-user" does not exist',
     ),
     "world plugin twice": world(
         "properties: {}\nlayers: []\nplugins:\n  - {name: w, type: DummyWorldPlugin}\n"
         "  - {name: w, type: DummyWorldPlugin}\n",
         'Invalid "world plugins" with name "w", type "DummyWorldPlugin" already exists',
-        5,
-    ),
-    "world plugin of a model": world_plugin(
-        "Laser",
-        'World Plugin "w" type "Laser": class "flatland.plugins.laser.Laser" of plugin '
-        '"flatland_plugins::Laser" must be a flatland::WorldPlugin, got a flatland::ModelPlugin',
-    ),
-    "wall without a layer": world_plugin(
-        "RandomWall, layer: a, robot_name: r",
-        'World Plugin "w" type "RandomWall": layer with name "a" does not exist',
     ),
     # Maps.
     "map that is a list": Input(
@@ -517,7 +285,7 @@ def test_zero_is_valid_with_any_sign(
 ) -> None:
     values = {"type": "circle", "radius": "1", "density": "1", key: number}
     entries = ", ".join(f"{name}: {value}" for name, value in values.items())
-    (folder / "zero.model.yaml").write_text(footprint(entries, "").text)
+    (folder / "zero.model.yaml").write_text(KINDS["footprint"][1](entries, "").text)
     with unchanged(running_world):
         running_world.spawn_model("zero.model.yaml", "zero", pose=(9, 9, 0))
         running_world.delete_model("zero")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import tricycle
 from broken_yaml import Case, Key, Section, cases
 
 import flatland
@@ -17,6 +18,12 @@ CIRCLE = "[{type: circle, radius: 0.2, density: 1}]"
 BODIES = f"bodies: [{{name: base, footprints: {CIRCLE}}}, {{name: wheel, footprints: []}}]\n"
 ENDS = "[{name: base, anchor: [0, 0]}, {name: wheel, anchor: [0, 0]}]"
 MODEL = 'model "robot"'
+
+
+def keys(kind: str, limit: str = "", required: bool = False, **values: str) -> tuple[Key, ...]:
+    """Returns keys of one kind with their valid values."""
+    return tuple(Key(name, value, kind, required, limit) for name, value in values.items())
+
 
 ENABLED = Key("enabled", "true", "bool")
 MATERIAL_KEYS = tuple(
@@ -30,16 +37,14 @@ WORLD_SECTIONS = [
         (
             Key("properties", "{}", "map", required=True),
             Key("layers", "[]", "list", required=True),
-            Key("models", "[]", "list"),
-            Key("plugins", "[]", "list"),
+            *keys("list", models="[]", plugins="[]"),
         ),
     ),
     Section(
         "properties",
         "layers: [{name: 2d}]\nproperties:\n",
         (
-            Key("velocity_iterations", "10", "int", limit="1 to 1000"),
-            Key("position_iterations", "10", "int", limit="1 to 1000"),
+            *keys("int", "1 to 1000", velocity_iterations="10", position_iterations="10"),
             Key("publish_map", "2d"),
         ),
         indent=2,
@@ -54,8 +59,7 @@ WORLD_SECTIONS = [
             Key("map", "map.yaml"),
             Key("color", "[1, 1, 1, 1]", "color", limit="finite"),
             Key("class", "wall"),
-            Key("material", "{}", "map"),
-            Key("properties", "{}", "map"),
+            *keys("map", material="{}", properties="{}"),
         ),
         indent=4,
         is_item=True,
@@ -92,8 +96,7 @@ WORLD_SECTIONS = [
         "models: [{name: robot, model: good.model.yaml}]\nplugins:\n  - type: RandomWall\n"
         "    name: walls\n",
         (
-            Key("layer", "2d", required=True),
-            Key("robot_name", "robot", required=True),
+            *keys("string", required=True, layer="2d", robot_name="robot"),
             Key("num_of_walls", "1", "int"),
             Key("wall_wall_dist", "1", "float", limit="finite"),
             Key("double_wall", "false", "bool"),
@@ -112,9 +115,8 @@ MAP_SECTIONS = [
         "",
         (
             Key("image", "map.png", required=True),
-            Key("resolution", "0.1", "float", required=True, limit="finite"),
+            *keys("float", "finite", required=True, resolution="0.1", occupied_thresh="0.5"),
             Key("origin", "[0, 0, 0]", "pose", required=True, limit="finite"),
-            Key("occupied_thresh", "0.5", "float", required=True, limit="finite"),
         ),
         location='layer "2d"',
         unknown_keys=False,
@@ -135,10 +137,8 @@ MAP_SECTIONS = [
 COLOR = Key("color", "[1, 1, 1, 0.5]", "color", limit="finite")
 FOOTPRINT_KEYS = (
     Key("density", "1", "float", required=True, limit="finite, >= 0"),
-    Key("friction", "0", "float", limit="finite, >= 0"),
-    Key("restitution", "0", "float", limit="finite, >= 0"),
-    Key("sensor", "false", "bool"),
-    Key("collision", "true", "bool"),
+    *keys("float", "finite, >= 0", friction="0", restitution="0"),
+    *keys("bool", sensor="false", collision="true"),
     Key("layers", "[2d]", "names"),
     Key("material", "{}", "map"),
 )
@@ -171,8 +171,7 @@ BODY_SECTIONS = [
         "",
         (
             Key("bodies", f"[{{name: base, footprints: {CIRCLE}}}]", "list", required=True),
-            Key("joints", "[]", "list"),
-            Key("plugins", "[]", "list"),
+            *keys("list", joints="[]", plugins="[]"),
             Key("class", "chair"),
         ),
         location=MODEL,
@@ -187,8 +186,7 @@ BODY_SECTIONS = [
             Key("pose", "[0, 0, 0]", "pose", limit="finite"),
             Key("type", "dynamic"),
             COLOR,
-            Key("linear_damping", "0", "float", limit="finite, >= 0"),
-            Key("angular_damping", "0", "float", limit="finite, >= 0"),
+            *keys("float", "finite, >= 0", linear_damping="0", angular_damping="0"),
             Key("class", "chair"),
             ENABLED,
         ),
@@ -232,8 +230,7 @@ BODY_SECTIONS = [
             *JOINT_KEYS,
             Key("type", "weld", required=True),
             Key("angle", "0", "float", limit="finite"),
-            Key("frequency", "0", "float", limit="finite, >= 0"),
-            Key("damping", "0", "float", limit="finite, >= 0"),
+            *keys("float", "finite, >= 0", frequency="0", damping="0"),
         ),
         **JOINT,
     ),
@@ -253,7 +250,7 @@ BODY_SECTIONS = [
     Section(
         "plugin entry",
         BODIES + "plugins:\n  - body: base\n",
-        (Key("name", "p", required=True), Key("type", "Tween", required=True)),
+        keys("string", required=True, name="p", type="Tween"),
         lead=1,
         indent=4,
         location=f'{MODEL} "plugins" index=0',
@@ -267,44 +264,38 @@ BODY = Key("body", "base", required=True)
 ORIGIN = Key("origin", "[0, 0, 0]", "pose", limit="coordinate")
 ANGLE = Key("angle", "{min: 0, max: 1, increment: 0.5}", "map", required=True)
 RANGE = Key("range", "5", "float", required=True)
-THREE_WHEELS = """\
-bodies:
-  - {name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}
-  - {name: front, footprints: []}
-  - {name: left, footprints: []}
-  - {name: right, footprints: []}
-joints:
-  - {name: f, type: revolute, bodies: [{name: base, anchor: [0, 0]}, {name: front, anchor: [0, 0]}]}
-  - {name: l, type: weld, bodies: [{name: base, anchor: [-1, 1]}, {name: left, anchor: [0, 0]}]}
-  - {name: r, type: weld, bodies: [{name: base, anchor: [-1, -1]}, {name: right, anchor: [0, 0]}]}
-"""
+RANGE_SENSOR = (
+    ORIGIN,
+    RATE,
+    Key("broadcast_tf", "true", "bool"),
+    Key("noise_std_dev", "0", "float", limit=">= 0"),
+    Key("layers", "[2d]", "names"),
+    AFTER_STEP,
+)
+THREE_WHEELS = f"bodies:{tricycle.BODIES}joints:\n{tricycle.JOINTS}"
 DRIVE_KEYS = (
     BODY,
-    Key("twist_sub", "cmd_vel"),
-    Key("odom_pub", "odom"),
-    Key("ground_truth_pub", "truth"),
-    Key("odom_frame_id", "odom"),
-    Key("ground_truth_frame_id", "map"),
+    *keys(
+        "string",
+        twist_sub="cmd_vel",
+        odom_pub="odom",
+        ground_truth_pub="truth",
+        odom_frame_id="odom",
+        ground_truth_frame_id="map",
+    ),
     Key("pub_rate", "10", "float", limit=">= 0"),
-    Key("enable_odom_tf_pub", "true", "bool"),
-    Key("twist_in_local_frame", "true", "bool"),
-    Key("odom_pose_noise", "[0, 0, 0]", "3 floats", limit="finite, >= 0"),
-    Key("odom_twist_noise", "[0, 0, 0]", "3 floats", limit="finite, >= 0"),
+    *keys("bool", enable_odom_tf_pub="true", twist_in_local_frame="true"),
+    *keys("3 floats", "finite, >= 0", odom_pose_noise="[0, 0, 0]", odom_twist_noise="[0, 0, 0]"),
     Key("odom_drift", "[0, 0, 0, 0]", "4 floats", limit="finite, >= 0"),
     Key("odom_pose_covariance", f"[{', '.join('0' * 36)}]", "36 floats"),
     Key("odom_twist_covariance", f"[{', '.join('0' * 36)}]", "36 floats"),
-    Key("linear_dynamics", "{}", "map"),
-    Key("angular_dynamics", "{}", "map"),
+    *keys("map", linear_dynamics="{}", angular_dynamics="{}"),
     AFTER_STEP,
 )
 
 
 def plugin(
-    type_name: str,
-    *keys: Key,
-    bodies: str = BODIES,
-    more: str = "",
-    inner: str = "",
+    type_name: str, *keys: Key, bodies: str = BODIES, more: str = "", inner: str = ""
 ) -> Section:
     """Returns the section of a plugin `p`, or of a map in it."""
     start = f"{bodies}plugins:\n  - type: {type_name}\n    name: p\n{more}"
@@ -329,8 +320,7 @@ LIMITS = tuple(
 )
 FORCE_KEYS = (
     Key("mode", "force", is_independent=False),
-    Key("max_force", "1", "float", required=True, limit=">= 0"),
-    Key("max_torque", "1", "float", required=True, limit=">= 0"),
+    *keys("float", ">= 0", required=True, max_force="1", max_torque="1"),
     Key("friction", "1", "float", limit=">= 0"),
     Key("grip_radius", "1", "float", limit="finite, >= 0"),
 )
@@ -340,24 +330,14 @@ PLUGIN_SECTIONS = [
         BODY,
         RANGE,
         ANGLE,
-        Key("topic", "scan"),
-        Key("frame", "laser"),
-        ORIGIN,
-        Key("broadcast_tf", "true", "bool"),
-        RATE,
-        Key("noise_std_dev", "0", "float", limit=">= 0"),
-        Key("layers", "[2d]", "names"),
-        Key("always_publish", "false", "bool"),
-        Key("upside_down", "false", "bool"),
-        Key("no_hit", "nan"),
+        *keys("string", topic="scan", frame="laser", no_hit="nan"),
+        *keys("bool", always_publish="false", upside_down="false"),
         Key("scan_time", "0", "float", limit="finite, >= 0"),
-        AFTER_STEP,
+        *RANGE_SENSOR,
     ),
     plugin(
         "Laser",
-        Key("min", "0", "float", required=True),
-        Key("max", "1", "float", required=True),
-        Key("increment", "0.5", "float", required=True),
+        *keys("float", required=True, min="0", max="1", increment="0.5"),
         more="    body: base\n    range: 5\n",
         inner="angle",
     ),
@@ -373,40 +353,43 @@ PLUGIN_SECTIONS = [
         "DiffDrive",
         *DRIVE_KEYS,
         Key("twist_pub", "twist"),
-        Key("enable_odom_pub", "true", "bool"),
-        Key("enable_twist_pub", "true", "bool"),
+        *keys("bool", enable_odom_pub="true", enable_twist_pub="true"),
     ),
     plugin("DiffDrive", *FORCE_KEYS, more="    body: base\n"),
     plugin("DiffDrive", *LIMITS, more="    body: base\n", inner="linear_dynamics"),
     plugin("DiffDrive", *LIMITS, more="    body: base\n", inner="angular_dynamics"),
     plugin(
         "TricycleDrive",
-        *DRIVE_KEYS,
-        Key("front_wheel_joint", "f", required=True),
-        Key("rear_left_wheel_joint", "l", required=True),
-        Key("rear_right_wheel_joint", "r", required=True),
-        Key("max_steer_angle", "0", "float", limit=">= 0"),
-        Key("max_angular_velocity", "0", "float", limit=">= 0"),
-        Key("max_steer_acceleration", "0", "float", limit=">= 0"),
+        BODY,
+        *keys(
+            "string",
+            required=True,
+            front_wheel_joint="front_j",
+            rear_left_wheel_joint="left_j",
+            rear_right_wheel_joint="right_j",
+        ),
+        *keys(
+            "float",
+            ">= 0",
+            max_steer_angle="0",
+            max_angular_velocity="0",
+            max_steer_acceleration="0",
+        ),
         bodies=THREE_WHEELS,
     ),
     plugin(
         "AckermannDrive",
         BODY,
-        Key("max_steer_angle", "0.5", "float", required=True, limit="finite"),
-        Key("wheelbase", "1", "float", required=True, limit="finite"),
+        *keys("float", "finite", required=True, max_steer_angle="0.5", wheelbase="1"),
         Key("rear_axle", "[0, 0]", "vector", limit="coordinate"),
-        Key("command", "steering"),
-        Key("twist_pub", "twist"),
+        *keys("string", command="steering", twist_pub="twist"),
     ),
     plugin(
         "OmniDrive",
         BODY,
         Key("layout", "mecanum", is_independent=False),
-        Key("wheelbase", "1", "float", required=True, limit="finite"),
-        Key("track", "1", "float", required=True, limit="finite"),
-        Key("max_wheel_speed", "0", "float", limit=">= 0"),
-        Key("max_wheel_acceleration", "0", "float", limit=">= 0"),
+        *keys("float", "finite", required=True, wheelbase="1", track="1"),
+        *keys("float", ">= 0", max_wheel_speed="0", max_wheel_acceleration="0"),
     ),
     plugin(
         "OmniDrive",
@@ -417,26 +400,26 @@ PLUGIN_SECTIONS = [
     ),
     plugin(
         "PathFollower",
-        Key("body", "base"),
+        *keys(
+            "string", body="base", frame="world", heading="forward", mode="once", start_topic="go"
+        ),
         Key("waypoints", "[[1, 0]]", "list", required=True),
-        Key("frame", "world"),
-        Key("heading", "forward"),
-        Key("mode", "once"),
-        Key("speed", "1", "float", limit="finite"),
-        Key("acceleration", "1", "float", limit=">= 0"),
-        Key("deceleration", "1", "float", limit=">= 0"),
-        Key("angular_speed", "1", "float", limit="finite"),
-        Key("angular_acceleration", "1", "float", limit=">= 0"),
-        Key("angular_deceleration", "1", "float", limit=">= 0"),
+        *keys("float", "finite", speed="1", angular_speed="1"),
+        *keys(
+            "float",
+            ">= 0",
+            acceleration="1",
+            deceleration="1",
+            angular_acceleration="1",
+            angular_deceleration="1",
+        ),
         Key("wait", "1", "float", limit="finite, >= 0"),
         Key("start", "true", "bool"),
-        Key("start_topic", "go"),
     ),
     plugin(
         "WheelStates",
-        Key("body", "base"),
+        *keys("string", body="base", topic="joint_states"),
         Key("wheels", "[{name: left, radius: 0.1}]", "list", required=True),
-        Key("topic", "joint_states"),
         Key("ticks_per_turn", "0", "int"),
         RATE,
     ),
@@ -447,8 +430,7 @@ PLUGIN_SECTIONS = [
             Key("radius", "0.1", "float", required=True, limit="finite, >= 1e-06"),
             Key("body", "base"),
             Key("position", "[0, 0]", "vector", limit="coordinate"),
-            Key("heading", "0", "float", limit="finite"),
-            Key("roller_angle", "1", "float", limit="finite"),
+            *keys("float", "finite", heading="0", roller_angle="1"),
             inner="wheels",
         ),
         is_item=True,
@@ -459,24 +441,20 @@ PLUGIN_SECTIONS = [
     ),
     plugin(
         "Hitch",
-        Key("body", "base"),
+        *keys(
+            "string", body="base", joint="hinge", topic="hitch", state_topic="hitched", service='""'
+        ),
         Key("origin", "[0, 0]", "vector", limit="coordinate"),
-        Key("joint", "hinge"),
         Key("reach", "0.1", "float", limit="0 to 1e8"),
         Key("max_angle", "1", "float"),
         Key("models", "[]", "names"),
-        Key("collide", "false", "bool"),
-        Key("start", "false", "bool"),
-        Key("topic", "hitch"),
-        Key("state_topic", "hitched"),
+        *keys("bool", collide="false", start="false"),
         RATE,
-        Key("service", '""'),
     ),
     plugin(
         "ModelTfPublisher",
-        Key("reference", "base"),
+        *keys("string", reference="base", world_frame_id="map"),
         Key("publish_tf_world", "false", "bool"),
-        Key("world_frame_id", "map"),
         Key("exclude", "[]", "names"),
         RATE,
         AFTER_STEP,
@@ -486,72 +464,48 @@ PLUGIN_SECTIONS = [
         BODY,
         RANGE,
         Key("field_of_view", "0.5", "float", required=True),
-        Key("radiation_type", "infrared"),
+        *keys("string", radiation_type="infrared", topic="range", frame="sonar", no_hit="inf"),
         Key("smallest_object", "0.1", "float"),
-        ORIGIN,
-        Key("topic", "range"),
-        Key("frame", "sonar"),
-        Key("broadcast_tf", "true", "bool"),
-        RATE,
-        Key("noise_std_dev", "0", "float", limit=">= 0"),
-        Key("layers", "[2d]", "names"),
-        Key("no_hit", "inf"),
-        AFTER_STEP,
+        *RANGE_SENSOR,
     ),
     plugin(
         "SemanticScan",
         BODY,
         RANGE,
         ANGLE,
-        ORIGIN,
-        Key("topic", "labels"),
-        Key("frame", "laser"),
-        Key("broadcast_tf", "true", "bool"),
-        RATE,
-        Key("noise_std_dev", "0", "float", limit=">= 0"),
-        Key("layers", "[2d]", "names"),
-        Key("no_hit", "nan"),
+        *keys("string", topic="labels", frame="laser", no_hit="nan"),
         Key("classes", "{}", "map"),
-        AFTER_STEP,
+        *RANGE_SENSOR,
     ),
     plugin(
         "PosePublisher",
-        Key("body", "base"),
+        *keys("string", body="base", message="odometry", topic="pose", frame_id="map"),
         ORIGIN,
         RATE,
-        Key("message", "odometry"),
-        Key("topic", "pose"),
-        Key("frame_id", "map"),
         Key("after_step", "false", "bool"),
     ),
     plugin(
         "Bumper",
-        Key("topic", "collisions"),
-        Key("world_frame_id", "map"),
+        *keys("string", topic="collisions", world_frame_id="map"),
         RATE,
         Key("publish_all_collisions", "true", "bool"),
         Key("exclude", "[]", "names"),
     ),
-    plugin("BoolSensor", Key("topic", "touch"), RATE, Key("body", "base")),
+    plugin("BoolSensor", *keys("string", topic="touch", body="base"), RATE),
     plugin(
         "Gps",
         BODY,
-        Key("topic", "gps"),
-        Key("frame", "gps"),
+        *keys("string", topic="gps", frame="gps"),
         ORIGIN,
         Key("broadcast_tf", "true", "bool"),
         RATE,
-        Key("ref_lat", "0", "float", limit="finite"),
-        Key("ref_lon", "0", "float", limit="finite"),
+        *keys("float", "finite", ref_lat="0", ref_lon="0"),
     ),
     plugin(
         "Imu",
         BODY,
-        Key("imu_pub", "imu"),
-        Key("ground_truth_pub", "truth"),
-        Key("imu_frame_id", "imu"),
-        Key("enable_imu_pub", "true", "bool"),
-        Key("broadcast_tf", "true", "bool"),
+        *keys("string", imu_pub="imu", ground_truth_pub="truth", imu_frame_id="imu"),
+        *keys("bool", enable_imu_pub="true", broadcast_tf="true"),
         RATE,
         *(
             Key(f"{name}_noise", "[0, 0, 0]", "3 floats", limit="finite, >= 0")
@@ -567,9 +521,7 @@ PLUGIN_SECTIONS = [
         BODY,
         Key("delta", "[0, 0, 0]", "pose", limit="coordinate"),
         Key("duration", "1", "float", limit="finite"),
-        Key("mode", "yoyo"),
-        Key("easing", "linear"),
-        Key("trigger_topic", '""'),
+        *keys("string", mode="yoyo", easing="linear", trigger_topic='""'),
     ),
     plugin(
         "DummyModelPlugin",

@@ -91,16 +91,6 @@ def test_no_path_leads_outside(world_file: Path, outside: Path, unchanged: Any, 
     )
 
 
-def test_an_expression_cannot_add_an_include(world_file: Path, outside: Path) -> None:
-    allowed = world_file.parent / "allowed"
-    (allowed / "eval.yaml").write_text(f"bodies: $eval return '$include {outside}/body.yaml'\n")
-    with (
-        flatland.World.from_yaml(world_file, seed=1, model_path=[allowed]) as world,
-        pytest.raises(flatland.YamlError, match="must be a list"),
-    ):
-        world.spawn_model(allowed / "eval.yaml", "b")
-
-
 @pytest.mark.parametrize("key", ["image", "data"])
 def test_nothing_is_said_about_other_files_of_a_map(
     world_file: Path, outside: Path, key: str
@@ -121,19 +111,21 @@ def test_nothing_is_said_about_other_files_of_a_map(
         assert caught.value.hint == (why if key == "image" else "")
 
 
-def test_a_reset_is_not_restricted(world_file: Path, outside: Path) -> None:
+def test_a_reset_and_worlds_without_the_option_are_not_restricted(
+    world_file: Path, outside: Path
+) -> None:
     (outside / "good.yaml").write_text("bodies: $include bodies.yaml\n")
     (outside / "bodies.yaml").write_text("[{name: base, footprints: []}]\n")
-    with flatland.World.from_yaml(
-        world_file, seed=1, model_path=[world_file.parent / "allowed"]
-    ) as world:
+    allowed = world_file.parent / "allowed"
+    (allowed / "eval.yaml").write_text(f"bodies: $eval return '$include {outside}/bodies.yaml'\n")
+    with flatland.World.from_yaml(world_file, seed=1, model_path=[allowed]) as world:
         world.reset()
         assert [model.name for model in world.models] == ["m"]
         with pytest.raises(flatland.YamlError, match="outside the folders of model_path"):
             world.spawn_model(outside / "good.yaml", "b")
-
-
-def test_by_default_nothing_is_restricted(world_file: Path, outside: Path) -> None:
+        # An expression cannot add an include.
+        with pytest.raises(flatland.YamlError, match="must be a list"):
+            world.spawn_model(allowed / "eval.yaml", "b")
     with flatland.World.from_yaml(world_file, seed=1) as world:
         world.spawn_model(outside / "good.yaml", "a")
 
@@ -169,9 +161,6 @@ def test_hints_are_shown_with_the_error(world_file: Path) -> None:
     assert caught.value.text_with_hint == f"{text} (hint: {hint})"
     shown = "".join(traceback.format_exception_only(caught.value))
     assert shown == f"flatland.errors.YamlError: {text}\nhint: {hint}\n"
-
-
-def test_an_error_without_a_hint_has_no_note() -> None:
     error = flatland.WorldError("text")
     assert error.text_with_hint == "Flatland World: text"
     assert not hasattr(error, "__notes__")

@@ -11,12 +11,7 @@ from flatland.config.node import Source
 
 @pytest.mark.parametrize(
     ("path", "resolved"),
-    [
-        ("a.yaml", "/folder/a.yaml"),
-        ("../a", "/a"),
-        ("/x/a", "/x/a"),
-        ("~/a", "/home/me/a"),
-    ],
+    [("a.yaml", "/folder/a.yaml"), ("../a", "/a"), ("/x/a", "/x/a"), ("~/a", "/home/me/a")],
 )
 def test_paths_are_relative_to_the_folder(
     path: str, resolved: str, monkeypatch: pytest.MonkeyPatch

@@ -16,8 +16,9 @@ def run(limits: DynamicsLimits, v: float, target: float, dt: float, steps: int) 
     return velocities
 
 
-def test_without_limits_the_target_is_reached_at_once() -> None:
-    limits = DynamicsLimits()
+@pytest.mark.parametrize("limit", [0.0, math.inf])
+def test_without_limits_the_target_is_reached_at_once(limit: float) -> None:
+    limits = DynamicsLimits(limit, limit, limit)
     assert limits.limit(0.0, 3.0, 0.01) == 3.0
     assert limits.limit(3.0, -3.0, 0.01) == -3.0
     assert limits.limit(-3.0, 0.0, 0.01) == 0.0
@@ -43,15 +44,11 @@ def test_deceleration_limit_holds_towards_zero(sign: float) -> None:
     assert limits.limit(sign * 1.2, sign * 1.0, 0.1) == sign * 1.0
 
 
-def test_default_deceleration_limit_is_the_acceleration_limit() -> None:
-    limits = DynamicsLimits(acceleration_limit=2.0)
-    assert limits.deceleration_limit == 2.0
-    assert limits.limit(1.0, 0.0, 0.1) == pytest.approx(0.8)
-
-
-def test_deceleration_limit_of_zero_means_no_limit() -> None:
-    limits = DynamicsLimits(acceleration_limit=2.0, deceleration_limit=0.0)
-    assert limits.limit(1.0, 0.0, 0.1) == 0.0
+@pytest.mark.parametrize(("deceleration", "reached"), [(None, 0.8), (0.0, 0.0), (5.0, 0.5)])
+def test_deceleration_limit(deceleration: float | None, reached: float) -> None:
+    """By default, it is the acceleration limit; 0 means no limit."""
+    limits = DynamicsLimits(acceleration_limit=2.0, deceleration_limit=deceleration)
+    assert limits.limit(1.0, 0.0, 0.1) == pytest.approx(reached)
 
 
 def test_velocity_above_a_limit_decelerates_to_it() -> None:
@@ -82,11 +79,6 @@ class TestCrossingZero:
         assert limits.limit(sign * 0.1, sign * -1.0, 0.1) == pytest.approx(sign * -1.0)
 
 
-def test_infinite_limit_means_no_limit() -> None:
-    limits = DynamicsLimits(math.inf, math.inf, math.inf)
-    assert limits.limit(-1.0, 7.0, 0.1) == 7.0
-
-
 @pytest.mark.parametrize("value", [-0.1, math.nan, -math.inf])
 @pytest.mark.parametrize("name", ["velocity_limit", "acceleration_limit", "deceleration_limit"])
 def test_invalid_limit_raises(name: str, value: float) -> None:
@@ -94,33 +86,33 @@ def test_invalid_limit_raises(name: str, value: float) -> None:
         DynamicsLimits(**{name: value})
 
 
-class TestFromConfig:
-    def read(self, text: str) -> DynamicsLimits:
-        reader = YamlReader.from_string(text)
-        return DynamicsLimits.from_config(reader.optional_subnode("limits", "map"))
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("{}", (0, 0, 0)),
+        ("limits: {}", (0, 0, 0)),
+        ("limits: {acceleration_limit: 2.5}", (0, 2.5, 2.5)),
+        (
+            "limits: {velocity_limit: 1, acceleration_limit: 2.5, deceleration_limit: 3}",
+            (1, 2.5, 3),
+        ),
+    ],
+)
+def test_limits_of_a_file(text: str, expected: tuple[float, ...]) -> None:
+    reader = YamlReader.from_string(text).optional_subnode("limits", "map")
+    assert DynamicsLimits.from_config(reader).as_tuple() == expected
 
-    def test_missing_map_means_no_limits(self) -> None:
-        limits = self.read("{}")
-        assert limits.limit(0.0, 100.0, 0.01) == 100.0
 
-    def test_all_keys_are_read(self) -> None:
-        limits = self.read(
-            "limits: {velocity_limit: 1, acceleration_limit: 2.5, deceleration_limit: 3}"
-        )
-        assert limits.velocity_limit == 1.0
-        assert limits.acceleration_limit == 2.5
-        assert limits.deceleration_limit == 3.0
-
-    def test_deceleration_defaults_to_acceleration(self) -> None:
-        assert self.read("limits: {acceleration_limit: 2.5}").deceleration_limit == 2.5
-        assert self.read("limits: {}").deceleration_limit == 0.0
-
-    @pytest.mark.parametrize("key", ["velocity_limit", "acceleration_limit", "deceleration_limit"])
-    @pytest.mark.parametrize("value", ["-1", ".nan"])
-    def test_negative_limit_is_an_error(self, key: str, value: str) -> None:
-        with pytest.raises(YamlError, match=f'Invalid "{key}", must not be negative or NaN'):
-            self.read(f"limits: {{{key}: {value}}}")
-
-    def test_unknown_key_is_an_error(self) -> None:
-        with pytest.raises(YamlError, match="top_speed"):
-            self.read("limits: {top_speed: 1}")
+@pytest.mark.parametrize("key", ["velocity_limit", "acceleration_limit", "deceleration_limit"])
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("{}: -1", 'Invalid "{}", must not be negative'),
+        ("{}: .nan", 'Invalid "{}", must not be negative or NaN'),
+        ("{}: 1, top_speed: 1", "top_speed"),
+    ],
+)
+def test_errors_of_a_file(key: str, entry: str, message: str) -> None:
+    reader = YamlReader.from_string(f"{{{entry.format(key)}}}")
+    with pytest.raises(YamlError, match=message.format(key)):
+        DynamicsLimits.from_config(reader)

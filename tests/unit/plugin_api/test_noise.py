@@ -25,26 +25,18 @@ def test_numbers_of_an_update_do_not_depend_on_draws_of_others() -> None:
     assert len({tuple(numbers) for numbers in every.values()}) == 10
 
 
-def test_draws_of_one_update_continue() -> None:
-    stream, other = NoiseStream([4]), NoiseStream([4])
+def test_draws_of_one_update_continue_and_leave_nothing_for_the_next_one() -> None:
+    stream, other = NoiseStream([5]), NoiseStream([5])
     stream.begin_update()
     other.begin_update()
     first, second = stream.rng.normal(), stream.rng.normal()
     assert [first, second] == other.rng.normal(size=2).tolist()
-
-
-def test_single_precision_draws_leave_no_remainder_for_the_next_update() -> None:
     # Half of a 64-bit number remains in the buffer of the generator after an odd number of draws.
-    stream, other = NoiseStream([5]), NoiseStream([5])
-    stream.begin_update()
     stream.rng.standard_normal(3, dtype=np.float32)
     stream.begin_update()
     other.begin_update()
-    other.begin_update()
-    assert (
-        stream.rng.standard_normal(3, dtype=np.float32).tolist()
-        == other.rng.standard_normal(3, dtype=np.float32).tolist()
-    )
+    found, expected = (each.rng.standard_normal(3, dtype=np.float32) for each in (stream, other))
+    assert found.tolist() == expected.tolist()
 
 
 @pytest.mark.parametrize("entropy", [[1, 3], [2, 2], [1], [1, 2, 1]])

@@ -92,19 +92,22 @@ class TestMotion:
         assert centre == pytest.approx((REAR, radius), abs=0.02)
         assert theta == pytest.approx(math.pi, abs=0.01)
 
-    def test_backwards_the_same_curve(self, car: Any) -> None:
-        world = car()
-        command(world, -1.0, 0.3)
+    @pytest.mark.parametrize(
+        ("limit", "speed", "rate", "angle"),
+        [
+            (0.8, -1.0, 0.3, -math.atan(WHEELBASE * 0.3)),
+            (0.4, 1.0, 5.0, 0.4),  # The angle is limited, and not the speed.
+        ],
+    )
+    def test_backwards_and_with_a_limited_angle(
+        self, car: Any, limit: float, speed: float, rate: float, angle: float
+    ) -> None:
+        world = car(limit=limit)
+        command(world, speed, rate)
         control_bodies(world)
-        assert plugin(world).steering_angle == pytest.approx(-math.atan(WHEELBASE * 0.3))
-        assert base(world).velocity[2] == pytest.approx(0.3, abs=1e-5)
-
-    def test_angle_limit_keeps_the_speed(self, car: Any) -> None:
-        world = car(limit=0.4)
-        command(world, 1.0, 5.0)
-        control_bodies(world)
-        assert plugin(world).steering_angle == pytest.approx(0.4)
-        assert base(world).velocity[2] == pytest.approx(math.tan(0.4) / WHEELBASE, abs=1e-5)
+        assert plugin(world).steering_angle == pytest.approx(angle)
+        expected = speed * math.tan(angle) / WHEELBASE
+        assert base(world).velocity[2] == pytest.approx(expected, abs=1e-5)
 
     def test_no_turn_in_place_and_a_stop_keeps_the_angle(self, car: Any) -> None:
         world = car()
@@ -138,11 +141,11 @@ class TestWheels:
         world.step(50)
         yaw = base(world).pose[2]
         for name in ("fl", "fr"):
-            x, y = ANCHORS[name]
+            # The angle of the line to the centre of the turn is that of the axle of the wheel.
             turn = WHEELBASE / math.tan(angle) if angle else math.inf
-            expected = math.atan(WHEELBASE / (turn - y)) if angle else 0.0
             heading = world.model("robot").body(name).pose[2] - yaw
-            assert heading == pytest.approx(expected, abs=2e-3), (name, x)
+            expected = math.atan(WHEELBASE / (turn - ANCHORS[name][1]))
+            assert heading == pytest.approx(expected, abs=2e-3), name
 
     def test_geometry_of_the_joints_equals_that_of_parameters(
         self, car: Any, plugin_world: Any
@@ -150,11 +153,11 @@ class TestWheels:
         geometry = plugin(car()).geometry
         assert (geometry.wheelbase, geometry.track) == pytest.approx((WHEELBASE, TRACK))
         assert geometry.rear_center == pytest.approx((REAR, 0.0))
-        text = (
+        plain = plugin_world(
             "[{type: AckermannDrive, name: drive, body: base, wheelbase: 2, rear_axle: [0.5, 0], "
             "max_steer_angle: 0.8}]"
         )
-        plain, jointed = plugin_world(text), car()
+        jointed = car()
         for world in (plain, jointed):
             command(world, 1.0, 0.4)
             world.step(100)
@@ -212,7 +215,7 @@ def test_odometry_and_twist(car: Any) -> None:
 @pytest.mark.parametrize(
     ("key", "moved", "message"),
     [
-        ("command", {}, "must be one of: twist, steering, ackermann, got drive"),
+        ("command", {}, 'Invalid "command", must be one of: twist, steering, ackermann, got drive'),
         ("front_right", {"fr": (2.4, -0.8)}, "The wheels of the front axle must have the same x"),
         ("rear_left", {"rl": (0.5, -0.9)}, "The left wheel of the rear axle must have a greater y"),
         ("front_left", {"rl": (0.5, 0.9)}, "The centres of both axles must have the same y"),
@@ -237,18 +240,3 @@ def test_errors(plugin_world: Any, key: str, moved: Any, message: str) -> None:
     lines = (plugin_world.files.folder / "robot.model.yaml").read_text().splitlines()
     (number,) = (number for number, line in enumerate(lines, 1) if line.strip().startswith(key))
     assert f"robot.model.yaml:{number}]" in error
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("max_steer_angle: 0.5", "wheelbase"),
-        ("wheelbase: 0, max_steer_angle: 0.5", 'Invalid "wheelbase", must be greater than 0'),
-        ("wheelbase: 1", "max_steer_angle"),
-        ("wheelbase: 1, max_steer_angle: 1.6", "must be above 0 and at most 1.553, got 1.6"),
-        ("front_left_wheel_joint: x, max_steer_angle: 0.5", 'Joint with name "x" does not exist'),
-    ],
-)
-def test_errors_of_parameters(plugin_world: Any, text: str, message: str) -> None:
-    entry = f"[{{type: AckermannDrive, name: drive, body: base, {text}}}]"
-    assert message in plugin_world.error(entry)

@@ -134,22 +134,6 @@ def test_model_tf_publisher(record: Any, rate: str) -> None:
     assert all(after[key] == before[key] for key in shared(before, after, rate))
 
 
-@pytest.mark.parametrize(("plugin", "topic"), [(LASER, "/scan"), (DIFF, "/odometry/ground_truth")])
-def test_the_last_value_of_a_step_has_the_time_after_it(
-    plugin_world: Any, plugin: str, topic: str
-) -> None:
-    world = plugin_world(f"- {{{plugin}, after_step: true}}")
-    output = world.output(topic)
-    for _ in range(5):
-        world.step()
-        assert output.latest.stamp == world.timekeeper.sim_time_ns
-    if plugin is DIFF:
-        world.command("/cmd_vel").set(flatland.Twist(linear_x=1.0))
-        world.step(3)
-        assert output.latest.pose == world.model("robot").body("base").pose
-        assert output.latest.pose[0] == pytest.approx(0.015, abs=1e-6)
-
-
 def test_a_model_that_is_spawned_later_publishes_after_its_first_step(plugin_world: Any) -> None:
     world = plugin_world(f"- {{{DIFF}, after_step: true}}")
     world.step(3)

@@ -24,6 +24,12 @@ TWO_BODIES = """
   pose: [-0.5, 0, 0]
   footprints: [{type: circle, radius: 0.2, density: 1}]
 """
+NEAR_BODIES = TWO_BODIES.replace("-0.5", "-0.39")  # which touch each other
+SENSOR_DISC = """
+- name: base
+  footprints:
+    - {type: circle, radius: 0.2, density: 1, sensor: true}
+"""
 SENSOR = "[{type: BoolSensor, name: switch}]"
 
 Collect = Callable[[flatland.World, str], list[Any]]
@@ -45,99 +51,53 @@ def test_defaults(plugin_world: Any, files: Any, collect: Collect) -> None:
     assert all(type(message) is bool for message in messages)
 
 
+@pytest.mark.parametrize(
+    "end",
+    [lambda world: world.move_model("robot", (-3, 0, 0)), lambda world: world.delete_model("wall")],
+    ids=["moved", "other model deleted"],
+)
 def test_false_after_the_end_of_the_contact(
-    plugin_world: Any, files: Any, collect: Collect
+    plugin_world: Any, files: Any, collect: Collect, end: Callable[[flatland.World], None]
 ) -> None:
     world = plugin_world(SENSOR)
     put_wall(world, files)
     messages = collect(world, "/bool_sensor")
     world.step()
-    world.move_model("robot", (-3, 0, 0))
+    end(world)
     world.step(2)
     assert messages == [True, False, False]
 
 
-def test_false_after_the_other_model_is_deleted(plugin_world: Any, files: Any) -> None:
-    world = plugin_world(SENSOR)
-    put_wall(world, files)
-    output = world.output("/bool_sensor")
-    world.step()
-    assert output.latest is True
-    world.delete_model("wall")
-    world.step()
-    assert output.latest is False
-
-
-@pytest.mark.parametrize(("body", "expected"), [("base", True), ("arm", False)])
-def test_contacts_of_other_bodies_are_ignored(
-    plugin_world: Any, files: Any, body: str, expected: bool
+@pytest.mark.parametrize(
+    ("bodies", "body", "wall", "expected"),
+    [
+        # The reference counts the contacts of every body of the model.
+        (TWO_BODIES, "body: base", 0.199, True),
+        (TWO_BODIES, "body: arm", 0.199, False),
+        # The default is the first body.
+        (TWO_BODIES, "", 0.199, True),
+        (TWO_BODIES, "", -0.899, False),
+        (NEAR_BODIES, "body: base", None, True),
+        (NEAR_BODIES, "body: arm", None, True),
+        (SENSOR_DISC, "", 0.199, True),
+        # Fixtures of one body do not touch each other.
+        (SENSOR_DISC + "    - {type: circle, radius: 0.3, density: 1}\n", "", None, False),
+    ],
+)
+def test_contacts_of_the_body_are_detected(
+    plugin_world: Any, files: Any, bodies: str, body: str, wall: float | None, expected: bool
 ) -> None:
-    # The reference counts the contacts of every body of the model.
-    world = plugin_world(f"[{{type: BoolSensor, name: switch, body: {body}}}]", bodies=TWO_BODIES)
-    put_wall(world, files)
+    world = plugin_world(f"[{{type: BoolSensor, name: switch, {body}}}]", bodies=bodies)
+    if wall is not None:
+        put_wall(world, files, wall)
     output = world.output("/bool_sensor")
     world.step()
     assert output.latest is expected
-
-
-def test_the_default_body_is_the_first_one(plugin_world: Any, files: Any) -> None:
-    world = plugin_world(SENSOR, bodies=TWO_BODIES)
-    output = world.output("/bool_sensor")
-    put_wall(world, files)
-    world.step()
-    assert output.latest is True
-    world.move_model("wall", (-0.899, 0, 0))
-    world.step()
-    assert output.latest is False
-    assert len(world.contacts) == 1
-
-
-@pytest.mark.parametrize("body", ["base", "arm"])
-def test_contacts_with_other_bodies_of_the_model_are_detected(plugin_world: Any, body: str) -> None:
-    world = plugin_world(
-        f"[{{type: BoolSensor, name: switch, body: {body}}}]",
-        bodies=TWO_BODIES.replace("-0.5", "-0.39"),
-    )
-    output = world.output("/bool_sensor")
-    world.step()
-    assert output.latest is True
-
-
-def test_fixtures_of_one_body_do_not_touch_each_other(plugin_world: Any) -> None:
-    two = """
-    - name: base
-      footprints:
-        - {type: circle, radius: 0.2, density: 1}
-        - {type: circle, radius: 0.3, density: 1, sensor: true}
-    """
-    world = plugin_world(SENSOR, bodies=two)
-    output = world.output("/bool_sensor")
-    world.step()
-    assert output.latest is False
-
-
-def test_contacts_with_sensor_fixtures_are_detected(plugin_world: Any, files: Any) -> None:
-    sensor = """
-    - name: base
-      footprints: [{type: circle, radius: 0.2, density: 1, sensor: true}]
-    """
-    world = plugin_world(SENSOR, bodies=sensor)
-    put_wall(world, files)
-    output = world.output("/bool_sensor")
-    world.step()
-    assert output.latest is True
-
-
-def test_contacts_with_walls_are_detected(plugin_world: Any, files: Any) -> None:
-    map_path = files.write_map("room", ["...", ".#.", "..."])
-    world = plugin_world(SENSOR, pose=(0.9, 1.5, 0), layers=f"[{{name: 2d, map: {map_path}}}]")
-    output = world.output("/bool_sensor")
-    world.step()
-    assert output.latest is True
+    assert len(world.contacts) == (expected or wall is not None)
 
 
 def test_several_contacts_end_one_by_one(plugin_world: Any, files: Any) -> None:
-    world = plugin_world(SENSOR, bodies=TWO_BODIES.replace("-0.5", "-0.39"))
+    world = plugin_world(SENSOR, bodies=NEAR_BODIES)
     put_wall(world, files)
     output = world.output("/bool_sensor")
     world.step()

@@ -49,56 +49,44 @@ def touching(plugin_world: Any, files: Any, plugins: str = BUMPER, **options: An
     return world
 
 
-def test_defaults(plugin_world: Any, files: Any, collect: Collect) -> None:
-    world = touching(plugin_world, files, namespace="r1")
-    messages = collect(world, "/r1/collisions")
+@pytest.mark.parametrize(
+    ("entry", "topic", "frame"),
+    # The frame of the world has no namespace.
+    [("", "/r1/collisions", "map"), ("topic: /hits, world_frame_id: earth", "/hits", "earth")],
+)
+def test_message(
+    plugin_world: Any, files: Any, collect: Collect, entry: str, topic: str, frame: str
+) -> None:
+    world = touching(
+        plugin_world, files, f"[{{type: Bumper, name: bumper, {entry}}}]", namespace="r1"
+    )
+    messages = collect(world, topic)
     world.step(2)
     assert [type(message) for message in messages] == [Collisions, Collisions]
-    # World frames have no namespace.
-    assert messages[0].frame_id == "map"
+    assert messages[0].frame_id == frame
     (collision,) = messages[0].collisions
     assert (collision.entity_a, collision.body_a) == ("robot", "base")
     assert (collision.entity_b, collision.body_b) == ("obstacle", "slab")
 
 
-def test_topic_and_frame(plugin_world: Any, files: Any) -> None:
-    world = touching(
-        plugin_world, files, "[{type: Bumper, name: b, topic: /hits, world_frame_id: earth}]"
-    )
-    output = world.output("/hits")
-    world.step()
-    assert output.latest.frame_id == "earth"
-
-
-def test_empty_lists_are_published_at_the_update_rate(plugin_world: Any, collect: Collect) -> None:
-    world = plugin_world("[{type: Bumper, name: bumper, update_rate: 20}]")
-    messages = collect(world, "/collisions")
-    world.step(200)
-    assert [message.stamp for message in messages] == [50_000_000 * i for i in range(1, 21)]
-    assert all(message.collisions == () for message in messages)
-
-
-def test_contacts_are_published_in_every_step(
-    plugin_world: Any, files: Any, collect: Collect
+@pytest.mark.parametrize(
+    ("entry", "wall_at", "steps"),
+    [
+        ("", 5.0, 10),  # empty lists at the update rate
+        ("", 0.199, 1),  # contacts in every step
+        ("publish_all_collisions: false", 0.199, 10),
+    ],
+)
+def test_times_of_messages(
+    plugin_world: Any, files: Any, collect: Collect, entry: str, wall_at: float, steps: int
 ) -> None:
-    world = touching(plugin_world, files, "[{type: Bumper, name: bumper, update_rate: 20}]")
+    world = plugin_world(f"[{{type: Bumper, name: bumper, update_rate: 20, {entry}}}]", bodies=DISC)
+    put(world, files, WALL, wall_at)
     messages = collect(world, "/collisions")
     world.step(40)
-    assert len(messages) == 40
-
-
-def test_without_publish_all_collisions_the_update_rate_holds(
-    plugin_world: Any, files: Any, collect: Collect
-) -> None:
-    world = touching(
-        plugin_world,
-        files,
-        "[{type: Bumper, name: b, update_rate: 20, publish_all_collisions: false}]",
-    )
-    messages = collect(world, "/collisions")
-    world.step(40)
-    assert [message.stamp for message in messages] == [50_000_000 * i for i in range(1, 5)]
-    assert all(len(message.collisions) == 1 for message in messages)
+    stamps = [5_000_000 * step for step in range(steps, 41, steps)]
+    assert [message.stamp for message in messages] == stamps
+    assert {len(message.collisions) for message in messages} == {int(wall_at < 1.0)}
 
 
 def test_a_late_subscriber_receives_existing_contacts(plugin_world: Any, files: Any) -> None:
@@ -114,10 +102,7 @@ def test_a_late_subscriber_receives_existing_contacts(plugin_world: Any, files: 
 def test_walls_of_a_layer(plugin_world: Any, files: Any) -> None:
     map_path = files.write_map("room", ["...", ".#.", "..."], origin="[0.2, -1.5, 0]")
     world = plugin_world(
-        BUMPER,
-        bodies=DISC,
-        pose=(1.1, 0, 0),
-        layers=f"[{{name: [room, floor], map: {map_path}}}]",
+        BUMPER, bodies=DISC, pose=(1.1, 0, 0), layers=f"[{{name: [room, floor], map: {map_path}}}]"
     )
     output = world.output("/collisions")
     world.step()
@@ -159,16 +144,6 @@ def test_force_at_rest_equals_the_applied_force(plugin_world: Any, files: Any) -
     assert collision.magnitude_forces == pytest.approx([7.5], rel=1e-3)
 
 
-def test_force_at_impact_stops_the_body(plugin_world: Any, files: Any) -> None:
-    world = touching(plugin_world, files)
-    base = world.model("robot").body("base")
-    base.set_velocity(0.4, 0.0, 0.0)
-    output = world.output("/collisions")
-    world.step()
-    (collision,) = output.latest.collisions
-    assert collision.magnitude_forces == pytest.approx([base.mass * 0.4 / DT], rel=1e-3)
-
-
 @pytest.mark.parametrize(
     ("wall_at", "solver_calls"),
     # Box2D solves a second time at the time of impact if the step would end within the wall. The
@@ -191,21 +166,9 @@ def test_two_corners_share_the_force(
     assert collision.contact_normals.shape == (2, 2)
 
 
-def test_sensor_contacts_have_empty_lists(plugin_world: Any, files: Any) -> None:
-    sensor = """
-    - name: base
-      footprints: [{type: circle, radius: 0.2, density: 10, sensor: true}]
-    """
-    world = touching(plugin_world, files, bodies=sensor)
-    output = world.output("/collisions")
-    world.step(2)
-    (collision,) = output.latest.collisions
-    assert collision.magnitude_forces.shape == (0,)
-    assert collision.contact_positions.shape == (0, 2)
-    assert collision.contact_normals.shape == (0, 2)
-
-
-def test_each_pair_of_fixtures_has_a_record(plugin_world: Any, files: Any) -> None:
+def test_each_pair_of_fixtures_has_a_record_without_forces_of_sensors(
+    plugin_world: Any, files: Any
+) -> None:
     two = """
     - name: base
       footprints:
@@ -215,25 +178,29 @@ def test_each_pair_of_fixtures_has_a_record(plugin_world: Any, files: Any) -> No
     world = touching(plugin_world, files, bodies=two)
     output = world.output("/collisions")
     world.step()
-    lengths = sorted(len(c.magnitude_forces) for c in output.latest.collisions)
-    assert lengths == [0, 1]
+    shapes = sorted(
+        (c.magnitude_forces.shape, c.contact_positions.shape, c.contact_normals.shape)
+        for c in output.latest.collisions
+    )
+    assert shapes == [((0,), (0, 2), (0, 2)), ((1,), (1, 2), (1, 2))]
 
 
-def test_a_record_is_removed_at_the_end_of_the_contact(plugin_world: Any, files: Any) -> None:
+@pytest.mark.parametrize(
+    "end",
+    [
+        lambda world: world.move_model("robot", (-3, 0, 0)),
+        lambda world: world.delete_model("obstacle"),
+    ],
+    ids=["moved", "other model deleted"],
+)
+def test_a_record_is_removed_at_the_end_of_the_contact(
+    plugin_world: Any, files: Any, end: Callable[[flatland.World], None]
+) -> None:
     world = touching(plugin_world, files)
     output = world.output("/collisions")
     world.step()
     assert len(output.latest.collisions) == 1
-    world.move_model("robot", (-3, 0, 0))
-    world.step()
-    assert output.latest.collisions == ()
-
-
-def test_a_record_is_removed_when_the_other_model_is_deleted(plugin_world: Any, files: Any) -> None:
-    world = touching(plugin_world, files)
-    output = world.output("/collisions")
-    world.step()
-    world.delete_model("obstacle")
+    end(world)
     world.step()
     assert output.latest.collisions == ()
 
@@ -286,19 +253,3 @@ def test_contacts_of_excluded_bodies_are_ignored(
     output = world.output("/collisions")
     world.step()
     assert len(output.latest.collisions) == left
-
-
-def test_contacts_between_other_models_are_ignored(plugin_world: Any, files: Any) -> None:
-    world = plugin_world(BUMPER, bodies=DISC, pose=(0, 5, 0))
-    files.write("mover.model.yaml", "bodies:" + DISC.replace("\n", "\n  "))
-    world.spawn_model("mover.model.yaml", "mover")
-    put(world, files, WALL, 0.199)
-    output = world.output("/collisions")
-    world.step()
-    assert len(world.contacts) == 1
-    assert output.latest.collisions == ()
-
-
-def test_an_illegal_topic_is_an_error(plugin_world: Any) -> None:
-    error = plugin_world.error("[{type: Bumper, name: bumper, topic: 'a b'}]")
-    assert 'Model Plugin "bumper" type "Bumper" model "robot": "a b" is not a legal topic' in error

@@ -71,12 +71,6 @@ class TestMotion:
         world.step(10)
         assert base(world).pose == pytest.approx((0.0, 0.0, 0.0), abs=1e-7)
 
-    def test_command_topic(self, plugin_world: Any) -> None:
-        world = plugin_world(drive("twist_sub: go"), namespace="r1")
-        command(world, 1.0, 0.0, "/r1/go")
-        world.step(10)
-        assert base(world).pose[0] == pytest.approx(0.05, abs=1e-5)
-
 
 class TestDynamics:
     def test_linear_dynamics(self, plugin_world: Any) -> None:
@@ -104,7 +98,7 @@ class TestDynamics:
 class TestGroundTruth:
     def test_message(self, plugin_world: Any, collect: Collect) -> None:
         world = plugin_world(drive(), namespace="r1", pose=(1.0, 2.0, 0.5), bodies=LOPSIDED)
-        truths = collect(world, "/r1" + TRUTH)
+        truths, odometry = collect(world, "/r1" + TRUTH), collect(world, "/r1" + ODOMETRY)
         command(world, 0.6, 0.4, "/r1/cmd_vel")
         world.step(2)
         first, second = truths
@@ -114,43 +108,27 @@ class TestGroundTruth:
         assert first.pose == pytest.approx((1.0, 2.0, 0.5), abs=1e-6)
         assert second.pose[2] == pytest.approx(0.502, abs=1e-6)
         assert second.pose[0] == pytest.approx(1.0 + 0.003 * math.cos(0.5), abs=1e-5)
-        assert not first.pose_covariance.any()
-        assert not first.twist_covariance.any()
+        # Without noise, the odometry is exact.
+        for exact, measured in zip(truths, odometry, strict=True):
+            assert (measured.frame_id, measured.child_frame_id) == ("odom", "r1_base")
+            assert (measured.stamp, measured.pose) == (exact.stamp, exact.pose)
+            assert measured.twist == exact.twist
 
+    @pytest.mark.parametrize(("local", "heading"), [("true", 0.0), ("false", 1.0)])
     def test_velocity_is_that_after_the_command_of_this_step(
-        self, plugin_world: Any, collect: Collect
+        self, plugin_world: Any, collect: Collect, local: str, heading: float
     ) -> None:
-        world = plugin_world(drive(), bodies=LOPSIDED, pose=(0.0, 0.0, 1.0))
-        truths = collect(world, TRUTH)
-        command(world, 0.6, 0.4)
-        world.step()
-        assert truths[0].twist == pytest.approx((0.6, 0.0, 0.4), abs=1e-5)
-
-    def test_twist_in_the_world_frame(self, plugin_world: Any, collect: Collect) -> None:
-        extra = "twist_in_local_frame: false"
+        extra = f"twist_in_local_frame: {local}"
         world = plugin_world(drive(extra), bodies=LOPSIDED, pose=(0.0, 0.0, 1.0))
         truths, odometry = collect(world, TRUTH), collect(world, ODOMETRY)
         command(world, 0.6, 0.4)
         world.step()
-        expected = (0.6 * math.cos(1.0), 0.6 * math.sin(1.0), 0.4)
+        expected = (0.6 * math.cos(heading), 0.6 * math.sin(heading), 0.4)
         assert truths[0].twist == pytest.approx(expected, abs=1e-5)
         assert odometry[0].twist == pytest.approx(expected, abs=1e-5)
 
 
 class TestOdometry:
-    def test_without_noise_odometry_equals_the_ground_truth(
-        self, plugin_world: Any, collect: Collect
-    ) -> None:
-        world = plugin_world(drive(), namespace="r1", pose=(1.0, 2.0, 0.5))
-        truths, odometry = collect(world, "/r1" + TRUTH), collect(world, "/r1" + ODOMETRY)
-        command(world, 0.6, 0.4, "/r1/cmd_vel")
-        world.step(3)
-        for exact, measured in zip(truths, odometry, strict=True):
-            assert measured.stamp == exact.stamp
-            assert (measured.frame_id, measured.child_frame_id) == ("odom", "r1_base")
-            assert measured.pose == exact.pose
-            assert measured.twist == exact.twist
-
     def test_noise_has_the_configured_variances(self, plugin_world: Any, collect: Collect) -> None:
         extra = (
             "odom_pose_noise: [0.04, 0.09, 0.16], odom_twist_noise: [0.25, 0.36, 0.49], "
@@ -158,14 +136,19 @@ class TestOdometry:
         )
         world = plugin_world(drive(extra))
         truths, odometry = collect(world, TRUTH), collect(world, ODOMETRY)
-        command(world, 0.5, 0.1)
+        twists = collect(world, "/twist")
+        command(world, 0.5, 0.0)
         world.step(2000)
         exact = np.array([[*value.pose, *value.twist] for value in truths])
         error = np.array([[*value.pose, *value.twist] for value in odometry]) - exact
-        assert error.std(axis=0) == pytest.approx([0.2, 0.3, 0.4, 0.5, 0.6, 0.7], rel=0.08)
-        assert np.abs(error.mean(axis=0)).max() < 0.07
-        correlation = np.corrcoef(error.T) - np.eye(6)
-        assert np.abs(correlation).max() < 0.1
+        forward = np.array([value.twist for value in twists]) - (0.5, 0.0, 0.0)
+        assert not forward[:, 1].any()
+        errors = np.hstack([error, forward[:, ::2]])
+        deviations = [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.5, 0.7]
+        assert errors.std(axis=0) == pytest.approx(deviations, rel=0.08)
+        assert np.abs(errors.mean(axis=0)).max() < 0.07
+        # All noises are independent.
+        assert np.abs(np.corrcoef(errors.T) - np.eye(8)).max() < 0.1
 
     def test_noise_does_not_depend_on_subscribers_of_other_outputs(self, plugin_world: Any) -> None:
         noise = "odom_pose_noise: [1, 1, 1], odom_twist_noise: [1, 1, 1]"
@@ -185,18 +168,6 @@ class TestOdometry:
         assert last_odometry(["/twist"]).pose == alone.pose
         assert last_odometry([TRUTH, "/twist"]).twist == alone.twist
         assert last_odometry(["/twist"], connects_at=9).pose == alone.pose
-
-    def test_default_covariance_has_the_variances(
-        self, plugin_world: Any, collect: Collect
-    ) -> None:
-        extra = "odom_pose_noise: [1, 2, 3], odom_twist_noise: [4, 5, 6]"
-        world = plugin_world(drive(extra))
-        odometry, truths = collect(world, ODOMETRY), collect(world, TRUTH)
-        world.step()
-        assert np.array_equal(odometry[0].pose_covariance, np.diag([1, 2, 0, 0, 0, 3]))
-        assert np.array_equal(odometry[0].twist_covariance, np.diag([4, 5, 0, 0, 0, 6]))
-        assert not truths[0].pose_covariance.any()
-        assert not truths[0].twist_covariance.any()
 
     @pytest.mark.parametrize("frame", ["wheel_odom", "/wheel_odom"])
     def test_frame_has_no_namespace(self, plugin_world: Any, collect: Collect, frame: str) -> None:
@@ -220,65 +191,48 @@ class TestTwist:
         assert twist.frame_id == "r1_base"
         assert twist.twist == pytest.approx((-0.6, 0.0, 0.4), abs=1e-5)
 
-    def test_noise_of_the_twist_is_independent_of_the_odometry(
+    def test_default_covariances_have_the_variances(
         self, plugin_world: Any, collect: Collect
     ) -> None:
-        world = plugin_world(drive("odom_twist_noise: [0.04, 0.09, 0.16]"))
-        odometry, twists = collect(world, ODOMETRY), collect(world, "/twist")
-        world.step(1500)
-        measured = np.array([value.twist for value in twists])
-        other = np.array([value.twist for value in odometry])
-        assert measured.std(axis=0) == pytest.approx([0.2, 0.0, 0.4], rel=0.1)
-        assert abs(np.corrcoef(measured[:, 0], other[:, 0])[0, 1]) < 0.1
-        assert abs(np.corrcoef(measured[:, 2], other[:, 2])[0, 1]) < 0.1
-
-    def test_covariance(self, plugin_world: Any, collect: Collect) -> None:
-        world = plugin_world(drive("odom_twist_noise: [4, 5, 6]"))
-        twists = collect(world, "/twist")
+        world = plugin_world(drive("odom_pose_noise: [1, 2, 3], odom_twist_noise: [4, 5, 6]"))
+        odometry, truths, twists = (collect(world, t) for t in (ODOMETRY, TRUTH, "/twist"))
         world.step()
-        assert np.array_equal(twists[0].covariance, np.diag([4, 5, 0, 0, 0, 6]))
-
-
-class TestTransform:
-    def test_transform_is_sent_without_subscribers(self, plugin_world: Any) -> None:
-        world = plugin_world(drive("enable_odom_pub: false, enable_twist_pub: false"))
-        command(world, 1.0, 0.0)
-        world.step(11)
-        assert world.transforms["odom", "base"].x == pytest.approx(0.05, abs=1e-5)
+        assert np.array_equal(odometry[0].pose_covariance, np.diag([1, 2, 0, 0, 0, 3]))
+        for covariance in (odometry[0].twist_covariance, twists[0].covariance):
+            assert np.array_equal(covariance, np.diag([4, 5, 0, 0, 0, 6]))
+        assert not truths[0].pose_covariance.any()
+        assert not truths[0].twist_covariance.any()
 
 
 class TestEnableParameters:
     def test_topic_parameters(self, plugin_world: Any) -> None:
-        extra = "odom_pub: a, ground_truth_pub: b/c, twist_pub: /d"
+        extra = "twist_sub: go, odom_pub: a, ground_truth_pub: b/c, twist_pub: /d"
         world = plugin_world(drive(extra), namespace="r1")
+        assert list(world.ports.commands) == ["/r1/go"]
         outputs = world.ports.outputs
         types = {topic: output.value_type for topic, output in outputs.items()}
         assert types == {"/r1/a": Odometry, "/r1/b/c": Odometry, "/d": TwistWithCovariance}
 
-    def test_default_topics(self, plugin_world: Any) -> None:
-        world = plugin_world(drive())
-        assert sorted(world.ports.outputs) == [ODOMETRY, TRUTH, "/twist"]
-        assert list(world.ports.commands) == ["/cmd_vel"]
-
     @pytest.mark.parametrize(
-        ("extra", "topics"),
+        ("extra", "topics", "frames"),
         [
-            ("enable_odom_pub: false", ["/twist"]),
-            ("enable_twist_pub: false", [ODOMETRY, TRUTH]),
-            ("enable_odom_pub: false, enable_twist_pub: false", []),
+            ("", [ODOMETRY, TRUTH, "/twist"], [("odom", "base")]),
+            ("enable_odom_pub: false", ["/twist"], [("odom", "base")]),
+            ("enable_twist_pub: false, enable_odom_tf_pub: false", [ODOMETRY, TRUTH], []),
+            ("enable_odom_pub: false, enable_twist_pub: false", [], [("odom", "base")]),
         ],
     )
-    def test_outputs(self, plugin_world: Any, extra: str, topics: list[str]) -> None:
+    def test_outputs(
+        self, plugin_world: Any, extra: str, topics: list[str], frames: list[tuple[str, str]]
+    ) -> None:
+        """The transform is sent without subscribers."""
         world = plugin_world(drive(extra))
         assert sorted(world.ports.outputs) == topics
         command(world, 1.0, 0.0)
-        world.step(10)
-        assert base(world).pose[0] == pytest.approx(0.05, abs=1e-5)
-
-    def test_no_transform_if_disabled(self, plugin_world: Any) -> None:
-        world = plugin_world(drive("enable_odom_tf_pub: false"))
-        world.step()
-        assert world.transforms == {}
+        world.step(11)
+        assert base(world).pose[0] == pytest.approx(0.055, abs=1e-5)
+        assert list(world.transforms) == frames
+        assert all(sent.x == pytest.approx(0.05, abs=1e-5) for sent in world.transforms.values())
 
     def test_pub_rate(self, plugin_world: Any, collect: Collect) -> None:
         world = plugin_world(drive("pub_rate: 50"))
@@ -343,21 +297,3 @@ class TestInvalidCommands:
         assert warnings_of_ten_invalid_commands() == 0
         now[0] += 0.6
         assert warnings_of_ten_invalid_commands() == 1
-
-
-class TestErrors:
-    @pytest.mark.parametrize(
-        ("extra", "message"),
-        [
-            (
-                f"odom_twist_covariance: [{', '.join(['.nan'] * 36)}]",
-                'Invalid "odom_twist_covariance", must not hold NaN',
-            ),
-            ("odom_pub: ''", '"" is not a legal topic name'),
-            ("twist_sub: 9lives", '"9lives" is not a legal topic name'),
-        ],
-    )
-    def test_parameters(self, plugin_world: Any, extra: str, message: str) -> None:
-        text = plugin_world.error(drive(extra))
-        assert 'Flatland plugin: Model Plugin "wheels" type "DiffDrive" model "robot": ' in text
-        assert message in text

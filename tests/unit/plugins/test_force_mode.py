@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import pytest
+import tricycle
 
 import flatland
 from tests.support.steps import control_bodies
@@ -47,11 +48,6 @@ def base(world: flatland.World) -> flatland.Body:
     return world.model("robot").body("base")
 
 
-def test_mass_of_the_robot(robot: Any) -> None:
-    world = robot(diff("max_force: 1, max_torque: 1"))
-    assert (base(world).mass, base(world).inertia) == pytest.approx((MASS, INERTIA), rel=1e-5)
-
-
 class TestDriving:
     def test_constant_force_up_to_the_target(self, robot: Any) -> None:
         world = robot(diff("max_force: 40, max_torque: 5"), pose=(0.0, 0.0, 0.6))
@@ -86,29 +82,20 @@ class TestDriving:
             expected = min(0.5 / INERTIA * k * DT, 2.0)
             assert base(world).velocity[2] == pytest.approx(expected, abs=1e-4)
 
-    def test_braking_with_the_same_force(self, robot: Any) -> None:
-        world = robot(diff("max_force: 40, max_torque: 5"))
-        drive(world, 1.0)
-        world.step(400)
-        drive(world, 0.0)
-        world.step(100)
-        assert base(world).velocity[0] == pytest.approx(1.0 - 0.8 * 0.5, abs=1e-5)
-        world.step(200)
-        assert base(world).velocity[0] == pytest.approx(0.0, abs=1e-4)
-
-    def test_limits_of_acceleration_apply_to_the_command(self, robot: Any) -> None:
-        world = robot(
-            diff("max_force: 40, max_torque: 5, linear_dynamics: {acceleration_limit: 0.2}")
-        )
-        drive(world, 1.0)
-        world.step(200)
-        assert base(world).velocity[0] == pytest.approx(0.2, abs=1e-5)
-
-    def test_wheels_spin_if_the_grip_is_less_than_the_force(self, robot: Any) -> None:
-        world = robot(diff("max_force: 400, max_torque: 5, friction: 0.3"))
+    @pytest.mark.parametrize(
+        ("entry", "steps", "speed"),
+        [
+            # Limits of the acceleration apply to the command.
+            ("max_force: 40, linear_dynamics: {acceleration_limit: 0.2}", 200, 0.2),
+            # Wheels spin if their grip is less than the force.
+            ("max_force: 400, friction: 0.3", 100, 0.3 * G * 0.5),
+        ],
+    )
+    def test_other_limits(self, robot: Any, entry: str, steps: int, speed: float) -> None:
+        world = robot(diff(f"max_torque: 5, {entry}"))
         drive(world, 2.0)
-        world.step(100)
-        assert base(world).velocity[0] == pytest.approx(0.3 * G * 0.5, abs=1e-4)
+        world.step(steps)
+        assert base(world).velocity[0] == pytest.approx(speed, abs=1e-4)
 
     def test_without_limits_the_motion_is_that_of_the_default_mode(self, robot: Any) -> None:
         text = "max_force: .inf, max_torque: .inf, friction: .inf"
@@ -233,35 +220,34 @@ def test_car_slides_out_of_a_curve_that_is_too_narrow(robot: Any) -> None:
     assert curvature < 0.65 / radius
 
 
-def test_car_accelerates_with_its_force(robot: Any) -> None:
-    world = robot(
-        "[{type: AckermannDrive, name: drive, body: base, wheelbase: 1, max_steer_angle: 1, "
-        "mode: force, max_force: 60}]"
-    )
-    drive(world, 2.0)
+@pytest.mark.parametrize(
+    ("entry", "target", "expected"),
+    [
+        (
+            "type: AckermannDrive, wheelbase: 1, max_steer_angle: 1, max_force: 60",
+            (2.0, 0.0),
+            (60.0 / MASS * 0.5, 0.0),
+        ),
+        ("type: OmniDrive, max_force: 50, max_torque: 5", (3.0, 4.0), (0.3, 0.4)),
+    ],
+)
+def test_car_and_omni_drive_accelerate_with_their_force(
+    robot: Any, entry: str, target: tuple[float, float], expected: tuple[float, float]
+) -> None:
+    world = robot(f"[{{name: drive, body: base, mode: force, {entry}}}]")
+    drive(world, target[0], 0.0, target[1])
     world.step(100)
-    assert base(world).velocity == pytest.approx((60.0 / MASS * 0.5, 0.0, 0.0), abs=1e-5)
+    assert base(world).velocity[:2] == pytest.approx(expected, abs=1e-4)
 
 
 def test_tricycle_accelerates_with_its_force(plugin_world: Any) -> None:
-    wheel = "footprints: [{type: circle, radius: 0.05, density: 100, collision: false}]"
-    places = {"front": (0.0, 0.0), "left": (-0.6, 0.3), "right": (-0.6, -0.3)}
-    bodies, joints = DISC, ""
-    for name, (x, y) in places.items():
-        kind = "revolute" if name == "front" else "weld"
-        bodies += f"- {{name: {name}, pose: [{x}, {y}, 0], {wheel}}}\n"
-        joints += (
-            f"- {{type: {kind}, name: {name}, bodies: [{{name: base, anchor: [{x}, {y}]}}, "
-            f"{{name: {name}, anchor: [0, 0]}}]}}\n"
-        )
+    bodies = tricycle.BODIES.replace("density: 1,", "density: 100,")
     world = plugin_world(
-        "[{type: TricycleDrive, name: drive, body: base, front_wheel_joint: front, "
-        "rear_left_wheel_joint: left, rear_right_wheel_joint: right, mode: force, max_force: 60}]",
-        bodies=bodies,
-        joints=joints,
+        f"[{{{tricycle.DRIVE}, mode: force, max_force: 60}}]", bodies=bodies, joints=tricycle.JOINTS
     )
-    mass = sum(body.mass for body in world.model("robot").bodies)
-    assert mass > MASS + 2.0
+    wheels = sum(body.mass for body in world.model("robot").bodies[1:])
+    assert wheels > 2.0
+    mass = base(world).mass + wheels
     drive(world, 2.0)
     world.step(100)
     # The joints of the wheels are solved iteratively.
@@ -270,57 +256,16 @@ def test_tricycle_accelerates_with_its_force(plugin_world: Any) -> None:
     assert base(world).velocity[0] == pytest.approx(2.0, abs=1e-3)
 
 
-def test_omni_drive_pushes_in_all_directions(robot: Any) -> None:
-    world = robot(
-        "[{type: OmniDrive, name: drive, body: base, mode: force, max_force: 50, max_torque: 5}]"
-    )
-    drive(world, 3.0, 0.0, 4.0)
-    world.step(100)
-    assert base(world).velocity[:2] == pytest.approx((0.3, 0.4), abs=1e-4)
-
-
 def test_bodies_on_joints_are_accelerated_together(plugin_world: Any) -> None:
-    bodies = (
-        DISC
-        + "- {name: arm, pose: [0, 0.3, 0], footprints: [{type: circle, radius: 0.1, \
-  density: 318.3098861837907, layers: []}]}"
-    )
-    joints = "[{name: j, type: revolute, bodies: [{name: base, anchor: [0, 0.3]}, \
-  {name: arm, anchor: [0, 0]}]}]"
+    arm = "{type: circle, radius: 0.1, density: 318.3098861837907, layers: []}"
     world = plugin_world(
         diff("max_force: 60, max_torque: 1000, friction: .inf"),
-        bodies=bodies.replace("\\\n", ""),
-        joints=joints.replace("\\\n", ""),
+        bodies=f"{DISC}- {{name: arm, pose: [0, 0.3, 0], footprints: [{arm}]}}",
+        joints="[{name: j, type: revolute, bodies: [{name: base, anchor: [0, 0.3]}, "
+        "{name: arm, anchor: [0, 0]}]}]",
     )
     total = sum(body.mass for body in world.model("robot").bodies)
     assert total == pytest.approx(60.0, rel=1e-4)
     drive(world, 3.0)
     world.step(200)
     assert base(world).velocity[0] == pytest.approx(1.0, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("plugins", "bodies", "message"),
-    [
-        (
-            diff("max_force: 1, max_torque: 1"),
-            DISC.replace("- name: base", "- name: base\n  type: kinematic"),
-            'requires a dynamic body with a mass, but body "base" is kinematic',
-        ),
-        (diff("max_force: 1, max_torque: 1"), "[{name: base, footprints: []}]", "has none"),
-        (
-            "[{type: DiffDrive, name: d, body: base, mode: push}]",
-            DISC,
-            'Invalid "mode", must be one of: velocity, force, got push',
-        ),
-        (
-            "[{type: DiffDrive, name: d, body: base, max_force: 5}]",
-            DISC,
-            '"max_force" requires "mode: force"',
-        ),
-    ],
-)
-def test_errors(plugin_world: Any, plugins: str, bodies: str, message: str) -> None:
-    error = plugin_world.error(plugins, bodies=bodies)
-    assert message in error
-    assert "robot.model.yaml" in error

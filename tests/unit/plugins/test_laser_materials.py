@@ -84,16 +84,6 @@ def test_intensities_exist_only_while_there_are_materials(
     assert scans[0].ranges.tobytes() != scans[1].ranges.tobytes()
 
 
-def test_scans_do_not_depend_on_subscribers(glass_world: Any, collect: Collect) -> None:
-    first, second = glass_world(), glass_world()
-    scans = collect(first, "/scan")
-    first.step(20)
-    second.step(10)
-    late = collect(second, "/scan")
-    second.step(10)
-    assert contents(scans)[10:] == contents(late)
-
-
 def test_paused_worlds_snapshots_clones_and_resets(glass_world: Any, collect: Collect) -> None:
     world = glass_world(", noise_std_dev: 0.02, update_rate: 50")
     scans = collect(world, "/scan")

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -8,7 +7,6 @@ import pytest
 
 import flatland
 from flatland.geometry import compose
-from flatland.plugins.model_tf_publisher import ModelTfPublisher
 
 BODIES = """
 - name: base
@@ -58,16 +56,6 @@ def test_reference_body(tf: Any) -> None:
     assert back == pytest.approx((0.0, 0.0, 0.0), abs=1e-5)
 
 
-def test_frames_are_namespaced(tf: Any) -> None:
-    world = tf("publish_tf_world: true", namespace="r1")
-    world.step()
-    assert set(world.transforms) == {
-        ("r1_base", "r1_arm"),
-        ("r1_base", "r1_hand"),
-        ("map", "r1_base"),
-    }
-
-
 def test_world_transform(tf: Any) -> None:
     world = tf("publish_tf_world: true, reference: arm")
     world.step()
@@ -75,25 +63,20 @@ def test_world_transform(tf: Any) -> None:
     assert pose(world.transforms["map", "arm"]) == pytest.approx(expected, abs=1e-5)
 
 
-@pytest.mark.parametrize("frame", ["earth", "/earth"])
-def test_world_frame_has_no_namespace(tf: Any, frame: str) -> None:
-    world = tf(f"publish_tf_world: true, world_frame_id: {frame}", namespace="r1")
+@pytest.mark.parametrize(
+    ("extra", "frames"),
+    [
+        ("", {("map", "r1_base"), ("r1_base", "r1_arm"), ("r1_base", "r1_hand")}),
+        ("exclude: [hand]", {("map", "r1_base"), ("r1_base", "r1_arm")}),
+        ("exclude: [arm, hand], world_frame_id: earth", {("earth", "r1_base")}),
+        ("exclude: [arm, hand], world_frame_id: /earth", {("/earth", "r1_base")}),
+    ],
+)
+def test_frames(tf: Any, extra: str, frames: set[tuple[str, str]]) -> None:
+    """Only the frame of the world has no namespace."""
+    world = tf(f"publish_tf_world: true, {extra}", namespace="r1")
     world.step()
-    assert (frame, "r1_base") in world.transforms
-
-
-def test_no_transforms_of_excluded_bodies(tf: Any) -> None:
-    world = tf("exclude: [hand], publish_tf_world: true")
-    world.step()
-    assert set(world.transforms) == {("base", "arm"), ("map", "base")}
-
-
-def test_transforms_follow_the_bodies(tf: Any) -> None:
-    world = tf()
-    world.step()
-    world.model("robot").body("arm").set_pose(4.0, 5.0, 0.8 + math.pi / 2)
-    world.step()
-    assert pose(world.transforms["base", "arm"]) == pytest.approx((0, 0, math.pi / 2), abs=1e-5)
+    assert set(world.transforms) == frames
 
 
 def test_update_rate(tf: Any) -> None:
@@ -124,30 +107,3 @@ def test_transforms_that_nobody_wanted_are_those_of_the_last_update(tf: Any, ext
             del transforms
 
     assert transforms([]) == transforms([Listener()])
-
-
-def test_transforms_are_computed_only_while_an_observer_wants_them(
-    tf: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    calls = []
-    publish = ModelTfPublisher._publish
-
-    def record(plugin: Any, timekeeper: Any) -> None:
-        calls.append(timekeeper.sim_time_ns)
-        publish(plugin, timekeeper)
-
-    class Observer(flatland.WorldObserver):
-        def transforms_sent(self, transforms: Any) -> None:
-            pass
-
-    monkeypatch.setattr(ModelTfPublisher, "_publish", record)
-    world = tf()
-    counts = []
-    observer = Observer()
-    for change in (world.step, world.add_observer, world.remove_observer, world.add_observer):
-        if change != world.step:
-            change(observer)
-        calls.clear()
-        world.step(50)
-        counts.append(len(calls))
-    assert counts == [1, 50, 0, 50]  # the first update is always called

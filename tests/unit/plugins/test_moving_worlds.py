@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-import flatland
 from flatland import Twist, World
 
 
@@ -144,11 +143,3 @@ def test_trailers_follow_on_the_circles_of_the_closed_form(checkout: Path) -> No
             vx, vy, omega = world.model(name).bodies[0].velocity
             assert omega == pytest.approx(0.2, rel=0.02)
             assert math.hypot(vx, vy) / omega == pytest.approx(math.sqrt(squared), rel=0.01)
-
-
-def test_the_stronger_robot_wins(checkout: Path) -> None:
-    with World.from_yaml(checkout / "worlds" / "pushing" / "world.yaml", seed=1) as world:
-        for name in ("strong", "weak"):
-            world.command(f"/{name}/cmd_vel").set(flatland.Twist(0.5))
-        world.step(1000)
-        assert world.model("weak").pose[0] > 4.5

@@ -138,19 +138,3 @@ def test_odometry_measures_sideways_motion(plugin_world: Any) -> None:
     assert truth.latest.twist == pytest.approx((0.3, 0.4, 0.0), abs=1e-5)
     assert twist.latest.twist[0] == pytest.approx(0.3, abs=1e-5)
     assert abs(twist.latest.twist[1] - 0.4) > 1e-4
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("layout: four", "must be one of: none, mecanum, three_wheel, got four"),
-        ("layout: mecanum, wheelbase: -1, track: 1", 'Invalid "wheelbase", must be greater than 0'),
-        ("layout: three_wheel, wheel_distance: 0", 'Invalid "wheel_distance"'),
-        ("max_wheel_speed: 1", '"max_wheel_speed" requires a "layout" with wheels'),
-        (f"{THREE}, track: 1", "track"),
-    ],
-)
-def test_errors(plugin_world: Any, text: str, message: str) -> None:
-    error = plugin_world.error(drive(text))
-    assert message in error
-    assert "robot.model.yaml" in error

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rooms_with_people import CALM, DOOR, ONE, ROOM, SHELF, load, people_of
 
+from flatland import Body, World
 from flatland.errors import PluginError, WorldError
 from tests.unit.conftest import WorldFiles
 
@@ -24,20 +25,25 @@ def test_the_speed_relaxes_exponentially(files: WorldFiles) -> None:
     assert speed == pytest.approx(1.2 * (1.0 - (1.0 - 0.005 / 0.5) ** 201), rel=1e-3)
 
 
+def two_people(files: WorldFiles, left_y: float, right_y: float, options: str = "") -> World:
+    """A world with two people who walk towards each other."""
+    groups = (
+        f"[{{name: a, count: 0, speed_deviation: 0, waypoints: [{{at: [8.4, {left_y}]}}]}},"
+        f" {{name: b, count: 0, speed_deviation: 0, waypoints: [{{at: [1.6, {right_y}]}}]}}]"
+    )
+    world = load(files, groups, CALM + options)
+    people_of(world).spawn("a", poses=[(2.0, left_y, 0.0)])
+    people_of(world).spawn("b", poses=[(8.0, right_y, math.pi)])
+    return world
+
+
 @pytest.mark.parametrize("model", ["social_force", "orca"])
 def test_two_people_avoid_each_other_symmetrically(files: WorldFiles, model: str) -> None:
-    groups = (
-        "[{name: a, count: 0, speed_deviation: 0, waypoints: [{at: [8.4, 2.9]}]},"
-        " {name: b, count: 0, speed_deviation: 0, waypoints: [{at: [1.6, 3.1]}]}]"
-    )
-    world = load(files, groups, CALM + f"model: {model}, ")
-    people = people_of(world)
-    people.spawn("a", poses=[(2.0, 2.9, 0.0)])
-    people.spawn("b", poses=[(8.0, 3.1, math.pi)])
+    world = two_people(files, 2.9, 3.1, f"model: {model}, ")
     closest = math.inf
     for _ in range(100):
         world.step(10)
-        (ax, ay, _), (bx, by, _) = people.people.poses
+        (ax, ay, _), (bx, by, _) = people_of(world).people.poses
         closest = min(closest, math.hypot(ax - bx, ay - by))
         # The room is symmetric about its center.
         assert (ax + bx, ay + by) == pytest.approx((10.0, 6.0), abs=0.05)
@@ -104,14 +110,8 @@ def test_opposite_streams_pass_a_door(files: WorldFiles, model: str) -> None:
 
 
 def test_people_keep_right_of_those_who_come_towards_them(files: WorldFiles) -> None:
-    groups = (
-        "[{name: a, count: 0, speed_deviation: 0, waypoints: [{at: [8.4, 3]}]},"
-        " {name: b, count: 0, speed_deviation: 0, waypoints: [{at: [1.6, 3]}]}]"
-    )
-    world = load(files, groups, CALM)
+    world = two_people(files, 3.0, 3.0)
     people = people_of(world)
-    people.spawn("a", poses=[(2.0, 3.0, 0.0)])
-    people.spawn("b", poses=[(8.0, 3.0, math.pi)])
     while people.people.poses[0, 0] < people.people.poses[1, 0]:
         world.step(10)
         assert world.time < 10.0
@@ -138,30 +138,29 @@ def test_those_who_wander_turn_away_from_a_closed_door(files: WorldFiles, model:
     assert walked.min() > 3.0  # between the places on this side, although half are on the other one
 
 
+def load_lines(files: WorldFiles, lines: str, group: str) -> World:
+    """Loads a world with walls of line segments and a group of people."""
+    files.write("walls.lines", lines)
+    files.write(
+        "walls.yaml", "{type: line_segments, data: walls.lines, scale: 1, origin: [0, 0, 0]}\n"
+    )
+    return files.load(
+        "properties: {}\nlayers: [{name: 2d, map: walls.yaml}]\n"
+        f"plugins: [{{name: people, type: Pedestrians, groups: [{{name: a, {group}}}]}}]\n"
+    )
+
+
 def test_those_who_wander_need_two_places_with_a_way_between_them(files: WorldFiles) -> None:
     # Each of 100 rooms has space for one person, so that the places are in different ones.
-    lines = [f"{i} 0 {i} 10\n0 {i} 10 {i}\n" for i in range(11)]
-    files.write("rooms.lines", "".join(lines))
-    files.write(
-        "rooms.yaml", "{type: line_segments, data: rooms.lines, scale: 1, origin: [0, 0, 0]}\n"
-    )
+    lines = "".join(f"{i} 0 {i} 10\n0 {i} 10 {i}\n" for i in range(11))
     with pytest.raises(PluginError, match="there are no two free places with a way between them"):
-        files.load(
-            "properties: {}\nlayers: [{name: 2d, map: rooms.yaml}]\nplugins: [{name: people,"
-            " type: Pedestrians, groups: [{name: a, count: 1, places: 2, radius: 0.4}]}]\n"
-        )
+        load_lines(files, lines, "count: 1, places: 2, radius: 0.4")
 
 
 def test_nobody_is_added_inside_of_furniture(files: WorldFiles) -> None:
-    files.write("shelf.lines", "0 0 9 0\n9 0 9 6\n9 6 0 6\n0 6 0 0\n" + SHELF)
-    files.write(
-        "shelf.yaml", "{type: line_segments, data: shelf.lines, scale: 1, origin: [0, 0, 0]}\n"
-    )
-    world = files.load(
-        "properties: {}\nlayers: [{name: 2d, map: shelf.yaml}]\n"
-        "plugins: [{name: people, type: Pedestrians, groups: [{name: a, count: 0,"
-        " area: [3, 1, 3.5, 5], waypoints: [{at: [8, 3]}]}]}]\n"
-    )
+    lines = "0 0 9 0\n9 0 9 6\n9 6 0 6\n0 6 0 0\n" + SHELF
+    group = "count: 0, area: [3, 1, 3.5, 5], waypoints: [{at: [8, 3]}]"
+    world = load_lines(files, lines, group)
     with pytest.raises(WorldError, match="found only 0 of 1 free places with a way"):
         people_of(world).spawn("a", 1)
 
@@ -295,17 +294,21 @@ def test_dynamic_people_can_be_pushed(files: WorldFiles) -> None:
     assert moved["dynamic"] > 0.02
 
 
+def legs_of(world: World, x: float, y: float) -> list[Body]:
+    """Adds a person who stands, and returns the legs."""
+    people = people_of(world)
+    [name] = people.spawn(poses=[(x, y, 0.0)])
+    people.stop([name])
+    world.step(100)
+    return [body for body in world.model(name).bodies if body.name != "body"]
+
+
 @pytest.mark.parametrize(("radius", "offset"), [(0.2, 0.25), (0.3, 0.125)])
 def test_legs_keep_their_radius_from_walls(files: WorldFiles, radius: float, offset: float) -> None:
     """In a passage of 1 m, wide legs are closer to each other."""
     options = CALM + f"layers: [body], legs: {{layers: [2d], radius: {radius}, spacing: 0.5}}, "
     passage = ["##########", "#        #", "##########"]
-    world = load(files, ONE % "[8, 1.5]", options, passage)
-    people = people_of(world)
-    [name] = people.spawn(poses=[(4.0, 1.5, 0.0)])
-    people.stop([name])
-    world.step(100)
-    legs = [body for body in world.model(name).bodies if body.name != "body"]
+    legs = legs_of(load(files, ONE % "[8, 1.5]", options, passage), 4.0, 1.5)
     assert [body.pose[1] for body in legs] == pytest.approx([1.5 + offset, 1.5 - offset], abs=1e-3)
 
 
@@ -314,21 +317,14 @@ def test_legs_collide_unless_the_body_can_be_pushed(
     files: WorldFiles, body_type: str, collides: bool
 ) -> None:
     options = CALM + f"layers: [body], legs: {{layers: [2d]}}, body_type: {body_type}, "
-    world = load(files, ONE % "[8, 3]", options)
-    [name] = people_of(world).spawn(poses=[(4.0, 3.0, 0.0)])
-    legs = [body for body in world.model(name).bodies if body.name != "body"]
+    legs = legs_of(load(files, ONE % "[8, 3]", options), 4.0, 3.0)
     assert [bool(leg.fixtures[0].mask_bits) for leg in legs] == [collides] * 2
 
 
 def test_lasers_see_the_legs_in_their_layer(files: WorldFiles) -> None:
     options = CALM + "layers: [body], legs: {layers: [2d], radius: 0.07, spacing: 0.2}, "
     world = load(files, ONE % "[8, 3]", options)
-    people = people_of(world)
-    [name] = people.spawn(poses=[(4.0, 3.0, 0.0)])
-    people.stop([name])
-    world.step(20)
-    legs = [body for body in world.model(name).bodies if body.name != "body"]
-    assert [body.pose[:2] for body in legs] == [
+    assert [body.pose[:2] for body in legs_of(world, 4.0, 3.0)] == [
         pytest.approx((4.0, 3.1), abs=1e-3),
         pytest.approx((4.0, 2.9), abs=1e-3),
     ]

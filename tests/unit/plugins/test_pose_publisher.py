@@ -53,9 +53,7 @@ def test_the_pose_is_that_before_the_step_or_after_it(plugin_world: Any, collect
     assert before[1:] == after[:2]
 
 
-def test_odometry_has_the_velocity_of_the_observed_frame_in_its_own_axes(
-    plugin_world: Any,
-) -> None:
+def test_odometry_has_the_velocity_of_the_observed_frame_in_its_own_axes(plugin_world: Any) -> None:
     world = plugin_world(
         "[{type: PosePublisher, name: truth, body: arm, message: odometry, topic: truth,"
         " frame_id: world, child_frame_id: tip, origin: [0.5, 0, 0.25]}]",

@@ -10,8 +10,6 @@ import pytest
 
 import flatland
 
-ROOM = ["#######", "#.....#", "#.....#", "#.....#", "#######"]
-
 
 def wall(entry: str = "") -> str:
     return f"[{{type: RandomWall, name: walls, layer: 2d, robot_name: robot, {entry}}}]".replace(
@@ -36,70 +34,49 @@ def edge_set(edges: Any) -> set[tuple[tuple[float, float], ...]]:
     }
 
 
-def test_wall_is_on_the_side_of_the_robot(plugin_world: Any, files: Any) -> None:
-    layers = lines(files, "0 0 4 0")
-    world = plugin_world(
-        pose=(2, 3, 0), layers=layers, world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5")
-    )
-    assert edge_set(world.layer("2d").edges) == edge_set(
-        [(0, 0, 4, 0), (0, 0.5, 4, 0.5), (0, 0, 0, 0.5), (4, 0, 4, 0.5)]
-    )
+LEFT = [(0, 1, 4, 1), (0, 0, 0, 1), (4, 0, 4, 1)]
+RIGHT = [(0, -1, 4, -1), (0, 0, 0, -1), (4, 0, 4, -1)]
 
 
-def test_wall_is_on_the_other_side_if_the_robot_is_there(plugin_world: Any, files: Any) -> None:
-    layers = lines(files, "0 0 4 0")
-    world = plugin_world(
-        pose=(2, -3, 0), layers=layers, world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5")
-    )
-    assert edge_set(world.layer("2d").edges[1:]) == edge_set(
-        [(0, -0.5, 4, -0.5), (0, 0, 0, -0.5), (4, 0, 4, -0.5)]
-    )
-
-
-def test_direction_of_the_edge_does_not_matter(plugin_world: Any, files: Any) -> None:
-    layers = lines(files, "4 0 0 0")
-    world = plugin_world(
-        pose=(2, 3, 0), layers=layers, world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5")
-    )
-    assert ((0.0, 0.5), (4.0, 0.5)) in edge_set(world.layer("2d").edges)
-
-
-def test_default_distance_is_one_metre_and_default_count_zero(
-    plugin_world: Any, files: Any
+@pytest.mark.parametrize(
+    ("edge", "robot", "entry", "expected"),
+    [
+        ("0 0 4 0", (2, 3), "num_of_walls: 1", LEFT),
+        ("4 0 0 0", (2, 3), "num_of_walls: 1", LEFT),  # the direction does not matter
+        ("0 0 4 0", (2, -3), "num_of_walls: 1", RIGHT),
+        ("0 0 4 0", (2, 3), "num_of_walls: 1, double_wall: true", LEFT + RIGHT),
+        ("0 0 4 0", (9, 0), "num_of_walls: 1, double_wall: true", LEFT + RIGHT),  # on the line
+        ("0 0 4 0", (2, 3), "", []),
+        # The reference offsets slanted edges along x and y at once, which is too far.
+        (
+            "0 0 4 3",
+            (1.82, 1.74),  # 0.3 m to its left
+            "num_of_walls: 1, wall_wall_dist: 0.5",
+            [(-0.3, 0.4, 3.7, 3.4), (0, 0, -0.3, 0.4), (4, 3, 3.7, 3.4)],
+        ),
+        (
+            "7 -5 11 -2",
+            (8.82, -3.26),
+            "num_of_walls: 1, wall_wall_dist: 0.5",
+            [(6.7, -4.6, 10.7, -1.6), (7, -5, 6.7, -4.6), (11, -2, 10.7, -1.6)],
+        ),
+    ],
+)
+def test_new_walls(
+    plugin_world: Any,
+    files: Any,
+    edge: str,
+    robot: tuple[float, float],
+    entry: str,
+    expected: list[tuple[float, ...]],
 ) -> None:
-    layers = lines(files, "0 0 4 0")
-    world = plugin_world(pose=(2, 3, 0), layers=layers, world_plugins=wall("num_of_walls: 1"))
-    assert ((0.0, 1.0), (4.0, 1.0)) in edge_set(world.layer("2d").edges)
-    world = plugin_world(pose=(2, 3, 0), layers=layers, world_plugins=wall())
-    assert len(world.layer("2d").edges) == 1
-
-
-def test_double_wall_adds_walls_on_both_sides(plugin_world: Any, files: Any) -> None:
-    layers = lines(files, "0 0 4 0")
+    """The pose of the model determines the side, and not that of a body."""
+    base = "- {name: base, pose: [0, -10, 0], footprints: []}"
     world = plugin_world(
-        pose=(2, 3, 0), layers=layers, world_plugins=wall("num_of_walls: 1, double_wall: true")
+        bodies=base, pose=(*robot, 0), layers=lines(files, edge), world_plugins=wall(entry)
     )
-    assert edge_set(world.layer("2d").edges[1:]) == edge_set(
-        [
-            *[(0, 1, 4, 1), (0, 0, 0, 1), (4, 0, 4, 1)],
-            *[(0, -1, 4, -1), (0, 0, 0, -1), (4, 0, 4, -1)],
-        ]
-    )
-
-
-@pytest.mark.parametrize(("x", "y"), [(0, 0), (7, -5)])
-def test_walls_of_slanted_edges_have_the_configured_distance(
-    plugin_world: Any, files: Any, x: int, y: int
-) -> None:
-    # The reference offsets slanted edges along x and y at once, which is too far.
-    layers = lines(files, f"{x} {y} {x + 4} {y + 3}")
-    world = plugin_world(
-        pose=(x + 1.82, y + 1.74, 0),  # 0.3 m to its left
-        layers=layers,
-        world_plugins=wall("num_of_walls: 1, wall_wall_dist: 0.5"),
-    )
-    expected = [(-0.3, 0.4, 3.7, 3.4), (0, 0, -0.3, 0.4), (4, 3, 3.7, 3.4)]
-    assert edge_set(world.layer("2d").edges[1:]) == edge_set(np.add(expected, [x, y, x, y]))
+    assert edge_set(world.layer("2d").edges[:1]) == edge_set([list(map(float, edge.split()))])
+    assert edge_set(world.layer("2d").edges[1:]) == edge_set(expected)
 
 
 def test_side_of_the_robot_is_determined_in_the_layer_frame(plugin_world: Any, files: Any) -> None:
@@ -114,21 +91,6 @@ def test_side_of_the_robot_is_determined_in_the_layer_frame(plugin_world: Any, f
     hit = world.physics.ray_cast(robot.pose[:2], (0.0, 2.0), world.layer("2d").category_bits)
     assert hit is not None
     assert hit.point == pytest.approx((10.5, 2.0), abs=1e-5)
-
-
-def test_the_pose_of_the_model_determines_the_side(plugin_world: Any, files: Any) -> None:
-    body = """
-    - name: base
-      pose: [0, -10, 0]
-      footprints: [{type: circle, radius: 0.2, density: 1}]
-    """
-    world = plugin_world(
-        bodies=body,
-        pose=(2, 3, 0),
-        layers=lines(files, "0 0 4 0"),
-        world_plugins=wall("num_of_walls: 1"),
-    )
-    assert ((0.0, 1.0), (4.0, 1.0)) in edge_set(world.layer("2d").edges)
 
 
 def test_new_walls_have_the_friction_of_the_layer_and_its_bits(
@@ -147,23 +109,22 @@ def test_new_walls_have_the_friction_of_the_layer_and_its_bits(
 
 
 def test_observers_are_notified(plugin_world: Any, files: Any) -> None:
+    changes: list[str] = []
+
     class Watcher(flatland.WorldObserver):
-        def __init__(self) -> None:
-            self.changes: list[tuple[str, int]] = []
-            self.world: Any = None
+        world: Any = None
 
         def layer_changed(self, layer_name: str) -> None:
-            self.changes.append(layer_name)
+            changes.append(layer_name)
 
-    watcher = Watcher()
     plugin_world(
         pose=(2, 3, 0),
         layers=lines(files, "0 0 4 0"),
         world_plugins=wall("num_of_walls: 1"),
-        observers=[watcher],
+        observers=[Watcher()],
     )
     # One notification for each new layer, and one for the new wall.
-    assert watcher.changes == ["2d", "3d", "2d"]
+    assert changes == ["2d", "3d", "2d"]
 
 
 def pick(plugin_world: Any, files: Any, count: int, seed: int) -> set[int]:
@@ -187,53 +148,3 @@ def test_picked_edges_are_determined_by_the_seed(plugin_world: Any, files: Any) 
     picked = [pick(plugin_world, files, 4, seed) for seed in (1, 1, 2, 3)]
     assert picked[0] == picked[1]
     assert len({frozenset(p) for p in picked}) > 1
-
-
-def test_edges_of_image_maps_can_be_picked(plugin_world: Any, files: Any) -> None:
-    path = files.write_map("room", ROOM)
-    world = plugin_world(
-        pose=(3.3, 2.2, 0),
-        layers=f"[{{name: 2d, map: {path}}}]",
-        world_plugins=wall("num_of_walls: 3, wall_wall_dist: 0.25"),
-    )
-    exact = world.layer("2d").exact_edge_count
-    assert len(world.layer("2d").edges) == exact + 9
-
-
-@pytest.mark.parametrize(
-    ("plugin", "text"),
-    [
-        ("layer: 2d, robot_name: rob", 'robot "rob" does not exist'),
-        (
-            "layer: 2d, robot_name: robot, num_of_walls: 3",
-            'num_of_walls is 3, but layer "2d" has only 2 edges',
-        ),
-        (
-            "layer: 2d, robot_name: robot, num_of_walls: 2",
-            'robot "robot" is on the line through the wall from (0, 0) to (4, 0) of layer "2d"',
-        ),
-        ("layer: 2d, robot_name: robot, num_of_walls: -1", '"num_of_walls", must not be negative'),
-        ("layer: 2d, robot_name: robot, wall_wall_dist: 0", '"wall_wall_dist", must be greater'),
-    ],
-)
-def test_invalid_parameters_are_errors(
-    plugin_world: Any, files: Any, plugin: str, text: str
-) -> None:
-    layers = lines(files, "0 0 4 0", "0 1 4 1")
-    with pytest.raises(flatland.PluginError) as caught:
-        plugin_world(
-            pose=(9, 0, 0),
-            layers=layers,
-            world_plugins=f"[{{type: RandomWall, name: walls, {plugin}}}]",
-        )
-    assert text in str(caught.value)
-    assert 'World Plugin "walls" type "RandomWall"' in str(caught.value)
-
-
-def test_a_robot_on_the_line_is_allowed_with_double_wall(plugin_world: Any, files: Any) -> None:
-    world = plugin_world(
-        pose=(9, 0, 0),
-        layers=lines(files, "0 0 4 0"),
-        world_plugins=wall("num_of_walls: 1, double_wall: true"),
-    )
-    assert len(world.layer("2d").edges) == 7

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import pytest
 
 import flatland
@@ -150,21 +149,9 @@ def test_models_that_are_deleted_and_spawned_again(scan_world: Any) -> None:
         assert labels(output.latest)[1] == NOTHING
 
 
-def test_noise_does_not_depend_on_subscribers(scan_world: Any) -> None:
-    ranges = []
-    for early in (True, False):
-        world = scan_world(", noise_std_dev: 0.1")
-        world.spawn_model("plant.yaml", "plant", pose=(1, 0, 0))
-        if early:
-            _ = world.output("/semantic_scan").latest
-        world.step(5)
-        output = world.output("/semantic_scan")
-        world.step()
-        ranges.append(output.latest.ranges)
-    np.testing.assert_array_equal(*ranges)
-    assert ranges[0][1] != pytest.approx(0.7, abs=1e-4)  # as without noise
-
-
-def test_the_name_of_a_class_must_not_be_empty(plugin_world: Any) -> None:
-    error = plugin_world.error(f"[{{{SCAN}, classes: {{chair: ''}}}}]")
-    assert 'Invalid "chair", the name of a class must not be empty' in error
+def test_ranges_have_noise(scan_world: Any, collect: Collect) -> None:
+    world = scan_world(", noise_std_dev: 0.1")
+    world.spawn_model("plant.yaml", "plant", pose=(1, 0, 0))
+    scans = collect(world, "/semantic_scan")
+    world.step(5)
+    assert len({float(scan.ranges[1]) for scan in scans} - {0.7}) == 5

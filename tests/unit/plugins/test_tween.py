@@ -46,22 +46,20 @@ def xs(world: flatland.World, steps: int) -> list[float]:
     return [pose[0] for pose in poses(world, steps)]
 
 
-def test_once(plugin_world: Any) -> None:
-    world = plugin_world(tween("delta: [1, 3, 2], duration: 1, mode: once"), step_size=0.5)
-    expected = [(0.5, 1.5, 1), (1, 3, 2), (1, 3, 2)]
-    assert poses(world, 3) == [pytest.approx(pose, abs=1e-5) for pose in expected]
-
-
-def test_loop(plugin_world: Any) -> None:
-    world = plugin_world(tween("delta: [10, 10, 1], duration: 2, mode: loop"), step_size=0.5)
-    found = poses(world, 6)
-    assert [pose[0] for pose in found] == pytest.approx([2.5, 5, 7.5, 10, 2.5, 5], abs=1e-5)
-    assert [pose[2] for pose in found] == pytest.approx([0.25, 0.5, 0.75, 1, 0.25, 0.5], abs=1e-5)
-
-
-def test_yoyo(plugin_world: Any) -> None:
-    world = plugin_world(tween("delta: [10, 10, 1], duration: 1, mode: yoyo"), step_size=0.5)
-    assert xs(world, 9) == pytest.approx([5, 10, 5, 0, 5, 10, 5, 0, 5], abs=1e-5)
+@pytest.mark.parametrize(
+    ("mode", "duration", "shares"),
+    [
+        ("once", 1, (0.5, 1, 1)),
+        ("loop", 2, (0.25, 0.5, 0.75, 1, 0.25, 0.5)),
+        ("yoyo", 1, (0.5, 1, 0.5, 0, 0.5, 1, 0.5, 0, 0.5)),
+    ],
+)
+def test_modes(plugin_world: Any, mode: str, duration: int, shares: tuple[float, ...]) -> None:
+    world = plugin_world(
+        tween(f"delta: [1, 3, 2], duration: {duration}, mode: {mode}"), step_size=0.5
+    )
+    expected = [pytest.approx((share, 3 * share, 2 * share), abs=1e-5) for share in shares]
+    assert poses(world, len(shares)) == expected
 
 
 def test_trigger(plugin_world: Any) -> None:
@@ -83,53 +81,37 @@ def test_trigger(plugin_world: Any) -> None:
     assert xs(world, 5) == pytest.approx([0.75, 0.5, 0.25, 0, 0], abs=1e-5)
 
 
-def test_trigger_accepts_booleans_only(plugin_world: Any) -> None:
-    world = plugin_world(tween("mode: trigger, trigger_topic: open"))
-    with pytest.raises(TypeError, match="takes bool"):
-        world.command("/open").set(1)
-
-
-def test_trigger_without_topic_does_not_move_and_logs_a_warning(
-    plugin_world: Any, caplog: pytest.LogCaptureFixture
+@pytest.mark.parametrize(
+    ("entry", "warning"),
+    [
+        ("mode: trigger", "never moves: mode trigger requires a trigger_topic"),
+        ("mode: once, trigger_topic: open", "ignores its trigger_topic in mode once"),
+    ],
+)
+def test_a_trigger_requires_the_mode_and_a_topic(
+    plugin_world: Any, caplog: pytest.LogCaptureFixture, entry: str, warning: str
 ) -> None:
-    world = plugin_world(tween("delta: [1, 0, 0], mode: trigger"))
-    assert xs(world, 2) == [0, 0]
+    world = plugin_world(tween(f"delta: [1, 0, 0], {entry}"))
+    assert (xs(world, 2) == [0, 0]) == ("mode: trigger" in entry)
     assert world.ports.commands == {}
-    warning = 'tween "tween" of model "robot" never moves: mode trigger requires a trigger_topic'
-    assert warning in caplog.text
+    assert f'tween "tween" of model "robot" {warning}' in caplog.text
 
 
-def test_topic_without_trigger_opens_no_port_and_logs_a_warning(
-    plugin_world: Any, caplog: pytest.LogCaptureFixture
-) -> None:
-    world = plugin_world(tween("mode: once, trigger_topic: open"))
-    assert world.ports.commands == {}
-    warning = 'tween "tween" of model "robot" ignores its trigger_topic in mode once'
-    assert warning in caplog.text
-
-
-def test_default_delta_is_zero(plugin_world: Any) -> None:
+def test_defaults(plugin_world: Any) -> None:
     world = plugin_world("[{type: Tween, name: tween, body: base}]", pose=(1, 2, 0.5))
     assert poses(world, 2) == [pytest.approx((1, 2, 0.5), abs=1e-6)] * 2
-
-
-def test_default_duration_is_a_second_and_easing_is_linear(plugin_world: Any) -> None:
-    world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.1)
-    assert xs(world, 11) == pytest.approx([*(i / 10 for i in range(1, 11)), 1], abs=1e-6)
+    # The duration is one second; the delta is in the world frame, whatever the heading.
+    world = plugin_world(
+        tween("delta: [1, 0, 0.5], mode: once"), pose=(3, 4, math.pi / 2), step_size=0.1
+    )
+    expected = [(3 + i / 10, 4, math.pi / 2 + i / 20) for i in (*range(1, 11), 10)]
+    assert poses(world, 11) == [pytest.approx(pose, abs=1e-5) for pose in expected]
 
 
 def test_easing(plugin_world: Any) -> None:
     world = plugin_world(tween("delta: [1, 2, 0], mode: once, easing: quadraticIn"), step_size=0.25)
     expected = [(p * p, 2 * p * p, 0) for p in (0.25, 0.5, 0.75, 1)]
     assert poses(world, 4) == [pytest.approx(pose, abs=1e-6) for pose in expected]
-
-
-def test_motion_starts_at_the_initial_world_pose(plugin_world: Any) -> None:
-    # The delta is in the world frame, whatever the heading of the body.
-    world = plugin_world(
-        tween("delta: [1, 0, 0.5], mode: once"), pose=(3, 4, math.pi / 2), step_size=0.5
-    )
-    assert poses(world, 2)[-1] == pytest.approx((4, 4, math.pi / 2 + 0.5), abs=1e-5)
 
 
 @pytest.mark.parametrize(("duration", "dt"), [(0.1, 1 / 30), (1.5, 0.005), (0.7, 0.1)])
@@ -163,14 +145,9 @@ def test_slow_backward_motion_ends_at_the_initial_pose(plugin_world: Any) -> Non
     assert found.index(0.0) == pytest.approx(100, abs=2)
 
 
-def test_steps_under_a_millisecond(plugin_world: Any) -> None:
-    # The reference counts whole milliseconds and would not move.
-    world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.0001)
-    assert xs(world, 5000)[-1] == pytest.approx(0.5, abs=1e-5)
-
-
 def test_long_motions_in_small_steps_are_on_time(plugin_world: Any) -> None:
-    # The error of a sum of 32-bit floats alone would be 5 cm.
+    # The error of a sum of 32-bit floats alone would be 5 cm. The reference counts whole
+    # milliseconds and would not move.
     world = plugin_world(tween("delta: [100, 0, 0], duration: 6, mode: once"), step_size=0.0001)
     world.step(59_000)
     assert world.model("robot").body("base").pose[0] == pytest.approx(59_000 / 600, abs=2e-3)
@@ -183,19 +160,14 @@ def test_every_type_of_body_moves(plugin_world: Any, body_type: str) -> None:
     assert xs(world, 4) == pytest.approx([0.25, 0.5, 0.75, 1], abs=1e-6)
 
 
-def test_a_wall_does_not_stop_the_motion(plugin_world: Any, files: Any) -> None:
+def test_neither_a_wall_nor_a_velocity_affects_the_motion(plugin_world: Any, files: Any) -> None:
     # Box2D alone would push the body out of the wall in the same step.
     world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.05)
+    world.model("robot").body("base").set_velocity(5.0, 5.0, 5.0)
     world.spawn_model(files.write("wall.model.yaml", WALL), "wall", pose=(0.4, 0, 0))
     found = poses(world, 20)
     assert [pose[0] for pose in found] == pytest.approx([i / 20 for i in range(1, 21)], abs=1e-6)
     assert [pose[1:] for pose in found] == [(0.0, 0.0)] * 20
-
-
-def test_a_velocity_does_not_deflect_the_motion(plugin_world: Any) -> None:
-    world = plugin_world(tween("delta: [1, 0, 0], mode: once"), step_size=0.25)
-    world.model("robot").body("base").set_velocity(5.0, 5.0, 5.0)
-    assert poses(world, 1)[0] == pytest.approx((0.25, 0, 0), abs=1e-6)
 
 
 def test_contacts_do_not_change_the_velocity(plugin_world: Any, files: Any) -> None:
@@ -209,33 +181,19 @@ def test_contacts_do_not_change_the_velocity(plugin_world: Any, files: Any) -> N
     assert world.model("robot").body("base").velocity == (0.0, 0.0, 0.0)
 
 
-def test_obstacles_are_pushed(plugin_world: Any, files: Any) -> None:
-    world = plugin_world(tween("delta: [1, 0, 0], duration: 2, mode: once"), bodies=STATIC)
-    world.spawn_model(files.write("crate.model.yaml", CRATE), "crate", pose=(0.35, 0, 0))
-    world.step(400)
-    x, y, _ = world.model("crate").body("box").pose
-    # The edge of the disc is at 1.2 at the end, and half the width of the crate is 0.1.
-    assert x == pytest.approx(1.3, abs=0.02)
-    assert y == pytest.approx(0.0, abs=0.02)
-
-
-def test_sleeping_obstacles_are_pushed(plugin_world: Any, files: Any) -> None:
+@pytest.mark.parametrize("sleeps", [False, True])
+def test_obstacles_are_pushed(plugin_world: Any, files: Any, sleeps: bool) -> None:
     world = plugin_world(
         tween("delta: [1, 0, 0], duration: 2, mode: trigger, trigger_topic: go"), bodies=STATIC
     )
     world.spawn_model(files.write("crate.model.yaml", CRATE), "crate", pose=(0.35, 0, 0))
     box = world.model("crate").body("box")
-    world.step(400)
-    assert not box.awake
+    world.step(400 if sleeps else 1)
+    assert box.awake != sleeps
     world.command("/go").set(True)
     world.step(400)
-    assert box.pose[0] == pytest.approx(1.3, abs=0.02)
-
-
-def test_body_remains_awake(plugin_world: Any) -> None:
-    world = plugin_world(tween("delta: [1, 0, 0], duration: 0.1, mode: once"))
-    world.step(400)
-    assert world.model("robot").body("base").awake
+    # The edge of the disc is at 1.2 at the end, and half the width of the crate is 0.1.
+    assert box.pose[:2] == pytest.approx((1.3, 0.0), abs=0.02)
 
 
 def test_contacts_at_the_end_of_the_motion_are_reported(plugin_world: Any, files: Any) -> None:
@@ -246,6 +204,7 @@ def test_contacts_at_the_end_of_the_motion_are_reported(plugin_world: Any, files
     )
     output = world.output("/bool_sensor")
     world.step(400)
+    assert world.model("robot").body("base").awake
     assert output.latest is False
     world.spawn_model(files.write("wall.model.yaml", WALL), "wall", pose=(1.1, 0, 0))
     world.step(2)

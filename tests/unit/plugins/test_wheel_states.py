@@ -116,20 +116,6 @@ def test_encoder_rounds_to_ticks(plugin_world: Any) -> None:
     assert state.latest.velocities == pytest.approx((-3.7, -3.7), abs=1e-4)
 
 
-def test_angles_do_not_depend_on_subscribers(plugin_world: Any) -> None:
-    found = []
-    for wanted in (False, True):
-        world = plugin_world(plugins("update_rate: 20"))
-        if wanted:
-            world.output("/joint_states")
-        command(world, 0.4, 0.7)
-        world.step(100)
-        for _ in range(100):
-            world.step()
-        found.append(wheels(world).angles)
-    assert found[0] == found[1]
-
-
 def test_a_move_does_not_turn_the_wheels(plugin_world: Any) -> None:
     world = plugin_world(plugins())
     command(world, 0.5, 0.0)
@@ -138,20 +124,3 @@ def test_a_move_does_not_turn_the_wheels(plugin_world: Any) -> None:
     assert wheels(world).angles == pytest.approx((2.5, 2.5), abs=1e-3)
     world.step(100)
     assert wheels(world).angles == pytest.approx((5.0, 5.0), abs=2e-3)
-
-
-@pytest.mark.parametrize(
-    ("wheels", "message"),
-    [
-        ("wheels: []", 'Invalid "wheels", must not be empty'),
-        ("wheels: [{name: a, radius: 1}, {name: a, radius: 1}]", 'name "a" exists twice'),
-        ("wheels: [{name: a, radius: 1, roller_angle: 0}]", 'Invalid "roller_angle"'),
-        ("wheels: [{name: a, radius: 1}], ticks_per_turn: -1", "ticks_per_turn"),
-        ("wheels: [{name: a, radius: 1, body: x}]", 'Body with name "x" does not exist'),
-    ],
-)
-def test_errors(plugin_world: Any, wheels: str, message: str) -> None:
-    entry = f"[{{type: WheelStates, name: wheels, {wheels}}}]"
-    error = plugin_world.error(entry)
-    assert message in error
-    assert "robot.model.yaml" in error
