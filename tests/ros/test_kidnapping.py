@@ -8,17 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from geometry_msgs.msg import Point, PoseWithCovarianceStamped, Quaternion
-from geometry_msgs.msg import Pose as PoseMessage
+from geometry_msgs.msg import Point, Pose, PoseWithCovarianceStamped, Quaternion
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
-from visualization_msgs.msg import InteractiveMarkerFeedback
 from waiting import wait_until
 
 KIDNAPPED = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
 plugins:
-  - {type: DiffDrive, name: drive, body: base, pub_rate: 50, ground_truth_frame_id: earth}
+  - {type: DiffDrive, name: drive, body: base, pub_rate: 50}
 """
 MODELS = """[
   {name: '007', namespace: r1, model: kidnapped.model.yaml, pose: [1, 2, 0.5]},
@@ -38,13 +36,6 @@ def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
         move_keeps_odometry=True,
         initialpose_model="'007'",
     )
-
-
-@pytest.fixture(scope="module")
-def initialpose(server: Any, module_ros: Any) -> Any:
-    """A publisher for the server, shared by all tests, as advertising takes long."""
-    del server
-    return module_ros.publisher("/initialpose", PoseWithCovarianceStamped)
 
 
 class Robot:
@@ -78,14 +69,6 @@ def _xy(point: Any) -> tuple[float, float]:
     return (point.x, point.y)
 
 
-def initial_pose(x: float, y: float, yaw: float = 0.0, frame: str = "map") -> Any:
-    message = PoseWithCovarianceStamped()
-    message.header.frame_id = frame
-    message.pose.pose.position = Point(x, y, 0)
-    message.pose.pose.orientation = Quaternion(0, 0, math.sin(yaw / 2), math.cos(yaw / 2))
-    return message
-
-
 def test_move_model_keeps_the_odometry(ros: Any) -> None:
     robot = Robot(ros)
     assert robot.is_at(START)
@@ -95,26 +78,12 @@ def test_move_model_keeps_the_odometry(ros: Any) -> None:
     assert robot.is_at(START)
 
 
-def test_dragging_keeps_the_odometry(ros: Any) -> None:
+def test_initialpose_moves_the_model_and_keeps_its_odometry(ros: Any) -> None:
     robot = Robot(ros)
-    feedback = ros.publisher("/interactive_model_markers/feedback", InteractiveMarkerFeedback)
+    publisher = ros.publisher("/initialpose", PoseWithCovarianceStamped)
     for place in (AWAY, START):
-        message = InteractiveMarkerFeedback(
-            client_id="test",
-            marker_name="007",
-            event_type=InteractiveMarkerFeedback.MOUSE_UP,
-            pose=PoseMessage(Point(*place, 0), Quaternion(0, 0, 0, 1)),
-        )
-        message.header.frame_id = "map"
-        feedback.publish(message)
-        wait_until("the dragged robot", lambda place=place: robot.is_at(place))
-
-
-@pytest.mark.parametrize("frame", ["map", "/map", "earth"])
-def test_initialpose_moves_the_model_and_keeps_its_odometry(
-    initialpose: Any, ros: Any, frame: str
-) -> None:
-    robot = Robot(ros)
-    for place in (AWAY, START):
-        initialpose.publish(initial_pose(*place, 2.0, frame))
+        message = PoseWithCovarianceStamped()
+        message.header.frame_id = "/map"
+        message.pose.pose = Pose(Point(*place, 0), Quaternion(0, 0, 1, 0))
+        publisher.publish(message)
         wait_until("the moved robot", lambda place=place: robot.is_at(place))

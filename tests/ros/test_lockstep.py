@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -9,29 +10,22 @@ from typing import Any
 
 import pytest
 import rospy
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
-from rosgraph_msgs.msg import Clock
+from rosgraph_msgs.msg import Clock, Log
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import Bool
-from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
 from waiting import TIMEOUT, wait_until
 
 from flatland.srv import StepWorld
 
 STEP_NS = 5_000_000
-MODELS = "[{name: r, model: robot.model.yaml, namespace: r, pose: [3, 3, 0]}]"
-
-
-@pytest.fixture(scope="module")
-def world(write_world: Callable[..., Path]) -> Path:
-    return write_world(MODELS)
 
 
 @pytest.fixture(scope="module", autouse=True)
-def server(module_launcher: Any, world: Path) -> Any:
+def server(module_launcher: Any, write_world: Callable[..., Path]) -> Any:
     """A server in lockstep, for most tests of this file."""
+    world = write_world("[{name: r, model: robot.model.yaml, namespace: r, pose: [3, 3, 0]}]")
     return module_launcher.server(world, lockstep=True, seed=1, shutdown_timeout=TIMEOUT)
 
 
@@ -73,13 +67,19 @@ def test_commands_sent_before_a_call_take_effect_in_it(ros: Any, step: Any) -> N
     wait_until("a robot at rest", lambda: not moves())
 
 
-def test_a_paused_world_is_stepped_and_stays_paused(ros: Any, step: Any) -> None:
-    ros.call("/pause", Empty)
-    before = step(0.0).stamp.to_nsec()
-    assert step(0.1).stamp.to_nsec() == before + 20 * STEP_NS
-    assert ros.topic("/flatland_server/paused", Bool).next().data is True
-    ros.call("/resume", Empty)
-    assert step(0.0).stamp.to_nsec() == before + 21 * STEP_NS
+def test_ignored_command_gives_a_warning_on_rosout(ros: Any, server: Any) -> None:
+    log = ros.topic("/rosout", Log)
+    commands = ros.publisher("/r/cmd_vel", Twist)
+
+    def warning_of_the_command() -> Log | None:
+        commands.publish(Twist(linear=Vector3(x=math.nan)))  # logged at most once a second
+        messages = log.rest(silence=0.1)
+        return next((m for m in messages if "previous command remains" in m.msg), None)
+
+    warning = wait_until("a warning on /rosout", warning_of_the_command)
+    server.wait_for_line(r"\[WARN\].*previous command remains in effect")
+    assert (warning.level, warning.name) == (Log.WARN, "/flatland_server")
+    assert warning.file.endswith(".py")
 
 
 def test_all_messages_of_the_steps_are_sent_without_a_further_step(ros: Any, step: Any) -> None:

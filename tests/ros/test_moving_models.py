@@ -21,21 +21,13 @@ plugins:
 """
 
 
-@pytest.fixture(scope="module")
-def trailers(module_launcher: Any, checkout: Path) -> Any:
+@pytest.fixture(scope="module", autouse=True)
+def server(module_launcher: Any, checkout: Path) -> Any:
     world = checkout / "worlds" / "trailers" / "world.yaml"
     return module_launcher.server(world, lockstep=True, seed=1)
 
 
-@pytest.fixture(scope="module")
-def drives(module_launcher: Any, checkout: Path) -> Any:
-    """Replaces the server of the other world."""
-    module_launcher.stop()
-    world = checkout / "worlds" / "drives" / "world.yaml"
-    return module_launcher.server(world, lockstep=True, seed=1)
-
-
-def test_hitch_by_service_and_topic(trailers: Any, ros: Any) -> None:
+def test_hitch_by_service_and_topic(ros: Any) -> None:
     state = ros.ready_topic("/hitched", Bool)
     ros.step(0.5)
     state.until(lambda message: message.data)
@@ -52,7 +44,9 @@ def test_hitch_by_service_and_topic(trailers: Any, ros: Any) -> None:
     ros.step_until("a connected trailer", lambda: state.next().data)
 
 
-def test_wheel_states_of_a_car(drives: Any, ros: Any) -> None:
+def test_wheel_states_of_a_car(ros: Any, checkout: Path) -> None:
+    car = checkout / "worlds" / "drives" / "car.model.yaml"
+    assert ros.spawn(car, "car", "car", (5.0, 15.0, 0.0)).success
     wheels = ros.ready_topic("/car/joint_states", JointState)
     command = Twist()
     command.linear.x = 1.0
@@ -75,7 +69,7 @@ def test_wheel_states_of_a_car(drives: Any, ros: Any) -> None:
 @pytest.mark.skipif(
     importlib.util.find_spec("ackermann_msgs") is not None, reason="ackermann_msgs is installed"
 )
-def test_a_missing_message_package_is_named(drives: Any, ros: Any) -> None:
+def test_a_missing_message_package_is_named(ros: Any) -> None:
     answer = ros.spawn("\n" + CAR, "new", "new")
     assert not answer.success
     assert "ackermann requires the ROS package ackermann_msgs, which is not installed" in (

@@ -80,16 +80,6 @@ def test_a_run_of_the_node_is_repeated_without_ros(
     assert poses[-1][1] > 0.1
 
 
-def test_a_file_that_cannot_be_created_is_a_fatal_error(
-    launcher: Any, write_world: Callable[..., Path], tmp_path: Path
-) -> None:
-    path = tmp_path / "missing" / "file"
-    server = launcher.start(world_path=write_world(), record_mcap=path)
-    assert server.wait() == 1
-    assert f'cannot create "{path}": No such file or directory' in server.output
-    assert "Traceback" not in server.output
-
-
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
 def test_a_full_disk_ends_the_recordings_only(
     ros: Any, launcher: Any, write_world: Callable[..., Path], tmp_path: Path

@@ -5,7 +5,6 @@ The launch files of the table are of the forms that are found in public reposito
 
 from __future__ import annotations
 
-import itertools
 import textwrap
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
@@ -19,7 +18,6 @@ import roslib.packages
 import rospkg
 import rosservice
 from geometry_msgs.msg import Pose2D
-from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 
@@ -48,29 +46,16 @@ class Form:
         name: Namespace.
         text: Content of `<launch>`, without the namespace.
         parameters: Some of the expected parameters of the server.
-        node: Name of the server.
         others: Names of the other nodes of the launch file.
     """
 
     name: str
     text: str
     parameters: dict[str, object] = field(default_factory=dict)
-    node: str = "flatland_server"
     others: tuple[str, ...] = ()
 
 
 FORMS = (
-    Form(
-        "node_with_parameters",
-        f"""
-        <env name="ROSCONSOLE_FORMAT" value="[${{severity}} ${{time}}]: ${{message}}"/>
-        <param name="use_sim_time" value="true"/>
-        <node name="flatland_server" pkg="flatland_server" type="flatland_server" output="screen">
-        {PARAMETERS}
-        </node>
-        """,
-        {"update_rate": 20, "step_size": 0.05, "show_viz": False, "viz_pub_rate": 5},
-    ),
     Form(
         "node_with_remaps_and_parameters_of_a_fork",
         f"""
@@ -85,28 +70,13 @@ FORMS = (
           <remap from="/step_world" to="/$(arg tf_prefix)/step_world"/>
         </node>
         """,
-        {"train_mode": False, "update_rate": 20},
-    ),
-    Form(
-        "node_with_attributes_and_another_name",
-        f"""
-        <node name="simulator" pkg="flatland_server" type="flatland_server" output="log"
-              respawn="false" required="true" launch-prefix="nice -n 1" if="true">
-        {PARAMETERS}
-        </node>
-        """,
-        node="simulator",
-    ),
-    Form(
-        "node_with_parameters_in_an_outer_namespace",
-        """
-        <rosparam>{step_size: 0.1, update_rate: 10, viz_pub_rate: 30}</rosparam>
-        <param name="world_path" value="$(arg world)"/>
-        <node name="flatland_server" pkg="flatland_server" type="flatland_server">
-          <param name="~debug/verbosity" value="1"/>
-        </node>
-        """,
-        {"debug/verbosity": 1},
+        {
+            "train_mode": False,
+            "update_rate": 20,
+            "step_size": 0.05,
+            "show_viz": False,
+            "viz_pub_rate": 5,
+        },
     ),
     Form(
         "include_with_a_world",
@@ -176,9 +146,9 @@ FORMS = (
 )
 
 
-# Forms whose nodes are started: with remapped topics, with parameters of a namespace, and with an
-# include that has all arguments. The others differ in what roslaunch reads.
-STARTED = FORMS[1], FORMS[3], FORMS[5]
+# Forms whose nodes are started: with remapped topics, and with an include that has all arguments.
+# The others differ in what roslaunch reads.
+STARTED = FORMS[0], FORMS[2]
 
 
 @pytest.fixture(scope="module")
@@ -220,11 +190,11 @@ def test_launch_files_of_the_reference_are_read_unedited(
 ) -> None:
     nodes = {node.namespace + node.name: node for node in config.nodes}
     packages = rospkg.RosPack(ros_environment["ROS_PACKAGE_PATH"].split(":"))
-    for name in (form.node, *form.others):
+    for name in ("flatland_server", *form.others):
         node = nodes[f"/{form.name}/{name}"]
         assert roslib.packages.find_node(node.package, node.type, packages), node.type
     given = {name: param.value for name, param in config.params.items()}
-    found = {name: given[f"/{form.name}/{form.node}/{name}"] for name in form.parameters}
+    found = {name: given[f"/{form.name}/flatland_server/{name}"] for name in form.parameters}
     assert found == form.parameters
     assert not config.config_errors
 
@@ -242,7 +212,7 @@ def test_launch_files_of_the_reference_start(
         return f"/{form.name}/toggle_pause" in names
 
     eventually(f"services of {form.name}", is_ready)
-    assert master.lookupNode(f"/{form.name}/{form.node}")
+    assert master.lookupNode(f"/{form.name}/flatland_server")
     for name in form.others:
         launched.wait_for_line(rf"process\[{form.name}/{name}-\d+\]: started")
     types = {
@@ -262,16 +232,6 @@ def test_remapped_clock_of_the_launch_file(launched: Any, module_ros: Any) -> No
     del launched
     assert module_ros.topic("/burger/clock", Clock).take(2)
     assert module_ros.topic("/burger/scan", LaserScan).next().ranges
-
-
-def test_parameters_of_an_outer_namespace_are_used(launched: Any, module_ros: Any) -> None:
-    """Its step size of 0.1 s is that of the namespace, not the default."""
-    del launched
-    topic = "/node_with_parameters_in_an_outer_namespace/odometry/ground_truth"
-    stamps = [
-        message.header.stamp.to_nsec() for message in module_ros.topic(topic, Odometry).take(5)
-    ]
-    assert {b - a for a, b in itertools.pairwise(stamps)} == {100_000_000}
 
 
 @pytest.mark.parametrize(

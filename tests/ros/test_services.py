@@ -9,17 +9,26 @@ from typing import Any
 
 import pytest
 import rospy
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Pose2D, Twist
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty
 from waiting import TIMEOUT, wait_until
 
-from flatland.srv import GetModelStates, SetRate, WaitUntilReady
+from flatland.msg import ModelPose, ModelSpec, ModelStates
+from flatland.srv import (
+    DeleteModels,
+    GetModelStates,
+    MoveModels,
+    SetRate,
+    SpawnModels,
+    WaitUntilReady,
+)
 
 NAN, INF = float("nan"), float("inf")
 STEP_NS = 5_000_000
+BALL = "{bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]}"
 ROBOT_PUBLISHERS = {"scan", "odometry/filtered", "odometry/ground_truth", "twist"}
 
 
@@ -27,11 +36,6 @@ ROBOT_PUBLISHERS = {"scan", "odometry/filtered", "odometry/ground_truth", "twist
 def world(write_world: Callable[..., Path]) -> Path:
     return write_world(
         "[{name: first, model: robot.model.yaml, namespace: first, pose: [3, 3, 0]}]",
-        broken="bodies: []\n",
-        unplugged="bodies: [{name: b, footprints: []}]\n"
-        "plugins: [{name: p, type: Nothing}, {name: q, type: Neither}]\n",
-        spaced="bodies: [{name: b, footprints: []}]\n"
-        "plugins: [{name: p, type: Bumper, topic: my topic}]\n",
         clock="bodies: [{name: b, footprints: []}]\n"
         "plugins: [{name: p, type: DiffDrive, body: b, odom_pub: /clock}]\n",
     )
@@ -47,12 +51,19 @@ def restored_world(ros: Any) -> Iterator[None]:
     """Resumes the world after each test, and checks that only the model of the file is left."""
     yield
     ros.call("/resume", Empty)
-    assert ros.call("/get_model_states", GetModelStates, []).states.name == ["first"]
+    assert states(ros).name == ["first"]
 
 
 def truth(ros: Any, namespace: str) -> Any:
     """Subscribes to the true pose of a robot."""
     return ros.topic(f"/{namespace}/odometry/ground_truth", Odometry)
+
+
+def states(ros: Any, *names: str) -> ModelStates:
+    """Returns the states of all models or of some of them."""
+    answer = ros.call("/get_model_states", GetModelStates, names)
+    assert (answer.success, answer.message) == (True, "")
+    return answer.states
 
 
 def test_spawn_move_and_delete(ros: Any) -> None:
@@ -96,15 +107,8 @@ def test_wait_until_ready(ros: Any) -> None:
 REFUSED = (
     ("missing.yaml", "m", "", (0, 0, 0), 'Flatland YAML: File does not exist, path="'),
     ("ball.model.yaml", "first", "", (0, 0, 0), "already exists"),
-    ("ball.model.yaml", "", "", (0, 0, 0), "name must not be empty"),
-    ("", "m", "", (0, 0, 0), "path must not be empty"),
     ("ball.model.yaml", "m", "my robot", (0, 0, 0), "not a legal ROS name"),
-    ("ball.model.yaml", "m", "ä", (0, 0, 0), "not a legal ROS name"),
     ("ball.model.yaml", "m", "", (NAN, 0, 0), "pose must be finite"),
-    ("broken.model.yaml", "m", "", (0, 0, 0), 'Invalid "bodies" in "m" model, must be a list'),
-    ("unplugged.model.yaml", "m", "", (0, 0, 0), 'Plugin "p" type "Nothing" model "m": no '),
-    ("unplugged.model.yaml", "m", "", (0, 0, 0), 'Plugin "q" type "Neither" model "m": no '),
-    ("spaced.model.yaml", "m", "", (0, 0, 0), '"my topic" is not a legal topic name'),
     ("clock.model.yaml", "m", "", (0, 0, 0), '"/clock" has the type rosgraph_msgs/Clock already'),
     ("missing/ünïcode.yaml", "ñ", "", (0, 0, 0), "ünïcode"),
     ("/dev/zero", "m", "", (0, 0, 0), "it is not a regular file"),
@@ -142,16 +146,9 @@ def test_name_of_a_model_may_be_any_text(ros: Any) -> None:
         assert ros.spawn("ball.model.yaml", name).success
         assert "already exists" in ros.spawn("ball.model.yaml", name).message
         assert ros.move(name, (1, 1, 0)).success
+        assert states(ros, name).name == [name]
         assert ros.delete(name).success
         assert not ros.delete(name).success
-
-
-def test_move_to_an_invalid_pose_is_refused(ros: Any) -> None:
-    answer = ros.move("first", (0, NAN, 0))
-    assert answer.success is False
-    assert answer.message.startswith('Flatland World: failed to move model "first", pose must be')
-    (pose,) = ros.call("/get_model_states", GetModelStates, ["first"]).states.pose
-    assert pose.x == pytest.approx(3, abs=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -169,16 +166,6 @@ def test_time_does_not_advance_while_paused(ros: Any, pause: str, resume: str) -
     clock.until(lambda message: message.clock.to_nsec() == last)
     ros.call(resume, Empty)
     assert clock.next().clock.to_nsec() == last + STEP_NS
-
-
-def test_calls_take_effect_while_paused(ros: Any) -> None:
-    ros.call("/pause", Empty)
-    assert ros.spawn("robot.model.yaml", "still", "still").success
-    assert "/still/cmd_vel" in ros.registered()["subscribers"]
-    assert ros.move("still", (2, 2, 0)).success
-    assert not ros.spawn("robot.model.yaml", "still").success
-    assert ros.delete("still").success
-    assert "/still/cmd_vel" not in ros.registered()["subscribers"]
 
 
 def test_calls_of_concurrent_clients_succeed(ros: Any) -> None:
@@ -200,20 +187,6 @@ def test_calls_of_concurrent_clients_succeed(ros: Any) -> None:
     for thread in threads:
         thread.join()
     assert problems == []
-
-
-def test_one_of_many_clients_spawns_a_model_of_the_same_name(ros: Any) -> None:
-    answers: list[Any] = []
-    threads = [
-        threading.Thread(target=lambda: answers.append(ros.spawn("ball.model.yaml", "same")))
-        for _ in range(6)
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert sorted(answer.success for answer in answers) == [False] * 5 + [True]
-    assert ros.delete("same").success
 
 
 def test_spawned_and_deleted_models_leave_nothing_registered(ros: Any) -> None:
@@ -244,3 +217,60 @@ def test_set_rate(ros: Any) -> None:
         clock.until(lambda message: message.clock.to_nsec() > now + 20 * STEP_NS)
     finally:
         ros.call("/set_rate", SetRate, 200.0)
+
+
+# -- several models ------------------------------------------------------------------------
+
+
+def test_models_are_spawned_moved_and_deleted_together(ros: Any) -> None:
+    before = ros.registered()
+    models = [ModelSpec("robot.model.yaml", f"m{i}", f"m{i}", Pose2D(i, -3, 0.5)) for i in range(3)]
+    models[1].yaml_path = BALL
+    answer = ros.call("/spawn_models", SpawnModels, models)
+    assert (answer.success, answer.message, answer.index) == (True, "", -1)
+    assert answer.poses == [model.pose for model in models]
+    assert {"/m0/scan", "/m2/scan"} <= ros.registered()["publishers"]
+    moves = [ModelPose(f"m{i}", Pose2D(i, 2, 0)) for i in (2, 0)]
+    answer = ros.call("/move_models", MoveModels, moves)
+    assert (answer.success, answer.message, answer.index) == (True, "", -1)
+    assert answer.poses == [move.pose for move in moves]
+    poses = states(ros, "m2", "m1", "m0").pose
+    assert poses == [moves[0].pose, models[1].pose, moves[1].pose]
+    answer = ros.call("/delete_models", DeleteModels, ["m0", "m1", "m2"])
+    assert (answer.success, answer.message, answer.index) == (True, "", -1)
+    assert ros.registered() == before
+
+
+def test_a_failed_call_leaves_everything_as_it_was(ros: Any) -> None:
+    before = ros.registered()
+    models = [
+        ModelSpec("robot.model.yaml", "m0", "m0", Pose2D()),
+        ModelSpec("{bodies: []}", "bad", "", Pose2D()),
+    ]
+    answer = ros.call("/spawn_models", SpawnModels, models)
+    assert (answer.success, answer.index, answer.poses) == (False, 1, [])
+    assert answer.message.startswith('Flatland World: models[1]: Invalid "bodies" in "bad" model')
+    answer = ros.call("/move_models", MoveModels, [ModelPose("ghost", Pose2D())])
+    assert (answer.success, answer.index, answer.poses) == (False, 0, [])
+    answer = ros.call("/delete_models", DeleteModels, ["first", "ghost"])
+    assert (answer.success, answer.index) == (False, 1)
+    assert ros.registered() == before
+
+
+def test_states_of_models_are_published_and_returned(ros: Any) -> None:
+    ros.call("/pause", Empty)
+    topic = ros.ready_topic("/model_states", ModelStates)
+    ros.step()
+    assert ros.spawn("ball.model.yaml", "ä☃", pose=(-3, 1, 0.5)).success
+    # Without a step, since a change of a paused world is published.
+    received, expected = topic.until(lambda message: len(message.name) == 2), states(ros)
+    assert (expected.name, expected.ns) == (["first", "ä☃"], ["first", ""])
+    assert expected.pose[1] == Pose2D(-3, 1, 0.5)
+    received.header.seq = expected.header.seq = 0
+    assert received == expected
+    assert states(ros, "ä☃", "first", "ä☃").ns == ["", "first", ""]
+    assert ros.delete("ä☃").success
+    answer = ros.call("/get_model_states", GetModelStates, ["first", "ghost"])
+    assert answer.success is False
+    assert answer.message == 'Flatland World: model with name "ghost" does not exist'
+    assert answer.states == ModelStates()

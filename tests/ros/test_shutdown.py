@@ -37,11 +37,6 @@ class EndlessStep(flatland.WorldPlugin):
             pass
 
 
-class EndlessEnd(flatland.WorldPlugin):
-    def on_shutdown(self):
-        threading.Event().wait()
-
-
 class EndlessThread(flatland.WorldPlugin):
     def on_initialize(self, config):
         threading.Thread(target=threading.Event().wait, name="worker").start()
@@ -103,13 +98,6 @@ def assert_was_ended(process: Any, ros: Any, running: str, timeout: str = "0.5")
     assert ros.registered_now() == NOTHING
 
 
-def test_signal_ends_a_node_at_full_speed(launcher: Any, ros: Any, world: Path) -> None:
-    process = launcher.server(world, update_rate=0)
-    ros.topic("/clock", Clock).next()
-    process.send(signal.SIGTERM)
-    assert_ended_cleanly(process, ros)
-
-
 def test_rosnode_kill_ends_a_paused_node(launcher: Any, ros: Any, world: Path) -> None:
     process = launcher.server(world)
     ros.call("/pause", Empty)
@@ -120,9 +108,11 @@ def test_rosnode_kill_ends_a_paused_node(launcher: Any, ros: Any, world: Path) -
 def test_plugin_may_take_a_second_to_write_a_file(
     launcher: Any, ros: Any, world_with: Callable[[str], Path]
 ) -> None:
+    """At full speed."""
     world = world_with("SlowEnd")
-    process = launcher.server(world)
-    process.send(signal.SIGINT)
+    process = launcher.server(world, update_rate=0)
+    ros.topic("/clock", Clock).next()
+    process.send(signal.SIGTERM)
     assert_ended_cleanly(process, ros)
     lines = (world.parent / "result.txt").read_text().splitlines()
     assert lines == [*(f"line {number}" for number in range(10)), "complete"]
@@ -142,30 +132,6 @@ def test_start_of_a_plugin_that_does_not_return_is_named(
     )
 
 
-def test_step_of_a_plugin_that_does_not_return_is_named(
-    launcher: Any, ros: Any, world_with: Callable[[str], Path]
-) -> None:
-    process = launcher.start(world_path=world_with("EndlessStep"), shutdown_timeout=0.5)
-    process.wait_for_line("stepping")
-    kill_node(ros)
-    assert_was_ended(
-        process,
-        ros,
-        'MainThread: World Plugin "slow" type "test::EndlessStep": before_physics_step, '
-        r"\S+:\d+ in before_physics_step$",
-    )
-
-
-def test_plugin_that_does_not_shut_down_is_named(
-    launcher: Any, ros: Any, world_with: Callable[[str], Path]
-) -> None:
-    # Even a busy machine has called `on_shutdown` by then.
-    process = launcher.server(world_with("EndlessEnd"), shutdown_timeout=4.0)
-    process.send(signal.SIGINT)
-    place = r'MainThread: World Plugin "slow" type "test::EndlessEnd": on_shutdown, '
-    assert_was_ended(process, ros, place, timeout="4")
-
-
 def test_thread_of_a_plugin_that_does_not_end_is_named(
     launcher: Any, ros: Any, world_with: Callable[[str], Path]
 ) -> None:
@@ -175,35 +141,22 @@ def test_thread_of_a_plugin_that_does_not_end_is_named(
     assert_was_ended(process, ros, r"worker: .*threading.py:\d+ in wait$", timeout="4")
 
 
-def map_of_noise(folder: Path, size: int) -> Path:
-    """Writes a world with a small layer, followed by a layer of noise, with a million edges."""
-    for name, pixels in (("small", 10), ("large", size)):
+def test_signal_while_a_large_map_loads(launcher: Any, ros: Any, tmp_path: Path) -> None:
+    """A small layer is followed by a layer of noise, with a million edges."""
+    for name, pixels in (("small", 10), ("large", 2000)):
         image = np.random.default_rng(1).choice(np.uint8([0, 255]), (pixels, pixels))
-        cv2.imwrite(str(folder / f"{name}.png"), image)
-        (folder / f"{name}.yaml").write_text(
+        cv2.imwrite(str(tmp_path / f"{name}.png"), image)
+        (tmp_path / f"{name}.yaml").write_text(
             f"{{image: {name}.png, resolution: 0.1, origin: [0, 0, 0], occupied_thresh: 0.65}}"
         )
-    path = folder / "world.yaml"
+    path = tmp_path / "world.yaml"
     layers = "[{name: small, map: small.yaml}, {name: large, map: large.yaml}]"
     path.write_text(f"{{properties: {{}}, layers: {layers}}}")
-    return path
-
-
-def test_signal_while_a_large_map_loads(launcher: Any, ros: Any, tmp_path: Path) -> None:
-    process = launcher.start(world_path=map_of_noise(tmp_path, 2000), shutdown_timeout=0.01)
+    process = launcher.start(world_path=path, shutdown_timeout=0.01)
     process.wait_for_line('Layer "small"')
     process.send(signal.SIGTERM)
     assert_was_ended(process, ros, r"MainThread: .*/flatland/\w+/\w+\.py:\d+ in ", timeout="0.01")
     assert ': loaded "' not in process.output
-
-
-def test_map_that_loads_within_the_time_limit_ends_cleanly(
-    launcher: Any, ros: Any, tmp_path: Path
-) -> None:
-    process = launcher.start(world_path=map_of_noise(tmp_path, 500), shutdown_timeout=600)
-    process.wait_for_line('Layer "small"')
-    process.send(signal.SIGTERM)
-    assert_ended_cleanly(process, ros)
 
 
 def test_stop_in_roslaunch_passes_the_time_limit(

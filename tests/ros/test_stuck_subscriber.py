@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ plugins:
   - {type: Laser, name: laser, body: base, range: 20,
      angle: {min: -2, max: 2, increment: 0.0004}}
 """
-DURATION = 2.5  # s of simulated time: 500 scans of 40 kB exceed the buffers of any socket
+DURATION = 1.0  # s of simulated time: 200 scans of 40 kB exceed the buffers of a connection
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -43,21 +42,6 @@ def test_other_subscribers_receive_all_messages(ros: Any, stuck: RawSubscriber) 
         assert scans.next().header.stamp.to_nsec() == now - 5_000_000
     # Services are not affected either.
     assert ros.spawn("ball.model.yaml", "ball").success
-
-
-def test_slow_reader_receives_complete_messages_up_to_the_newest(
-    ros: Any, stuck: RawSubscriber
-) -> None:
-    last = ros.step(DURATION) - 5_000_000  # A scan has the time before its step.
-    stamps = []
-    while not stamps or stamps[-1] < last:
-        scan = stuck.next()
-        assert len(scan.ranges) == 10_001
-        stamps.append(scan.header.stamp.to_nsec())
-    # In order, without duplicates, and with gaps of dropped messages.
-    assert stamps == sorted(set(stamps))
-    steps = [after - before for before, after in itertools.pairwise(stamps)]
-    assert max(steps) > 5_000_000
 
 
 def test_closed_connection_is_removed(ros: Any, stuck: RawSubscriber, server: Any) -> None:

@@ -201,32 +201,6 @@ def test_teleop_launch_runs_in_the_terminal(terminal: Callable[..., Terminal], r
     assert program.current_attributes == program.attributes
 
 
-def test_an_invalid_parameter_is_reported(
-    terminal: Callable[..., Terminal], teleop_path: str, ros: Any
-) -> None:
-    del ros
-    program = terminal(teleop_path, "_rate:=inf")
-    assert program.wait() == 1
-    program.until(r'Invalid parameter "~rate": it must be a positive, finite number')
-    assert program.current_attributes == program.attributes
-
-
-def test_no_terminal_is_reported(launcher: Any) -> None:
-    process = launcher.program("rosrun", "flatland", "teleop_key")
-    assert process.wait() == 1
-    assert process.output.startswith("teleop_key: the standard input is not a terminal: ")
-    assert "rosrun flatland teleop_key" in process.output
-
-
-def test_no_master_is_reported(
-    launcher: Any, terminal: Callable[..., Terminal], teleop_path: str
-) -> None:
-    launcher.environment = {**launcher.environment, "ROS_MASTER_URI": "http://127.0.0.1:1"}
-    program = terminal(teleop_path)
-    assert program.wait() == 1
-    program.until("teleop_key: no ROS master at http://127.0.0.1:1: start the simulator first")
-
-
 def test_the_joystick_is_configured(
     checkout: Path, ros_environment: dict[str, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -14,7 +14,6 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
-from visualization_msgs.msg import MarkerArray
 
 MAX_DELAY = 20.0  # s; of a message on a busy machine, far less than the age of a simulated time
 
@@ -24,19 +23,8 @@ def server(
     module_launcher: Any, module_ros: Any, write_world: Callable[..., Path]
 ) -> Iterator[Any]:
     world = write_world("[{name: robot, model: robot.model.yaml}]")
-    (world.parent / "markers.launch").write_text(
-        f"""
-<launch>
-  <include file="$(find flatland)/launch/server.launch">
-    <arg name="world_path" value="{world}"/>
-    <arg name="use_sim_time" value="false"/>
-    <arg name="show_viz" value="false"/>
-  </include>
-  <param name="/flatland_server/show_viz" value="true"/>
-</launch>
-"""
-    )
-    yield module_launcher.launch(str(world.parent / "markers.launch"))
+    arguments = (f"world_path:={world}", "use_sim_time:=false", "show_viz:=false")
+    yield module_launcher.launch("flatland", "server.launch", *arguments)
     module_ros.master.setParam("/use_sim_time", True)
 
 
@@ -82,14 +70,6 @@ def test_stamps_are_current_after_a_pause(server: Any, ros: Any) -> None:
     # Scans of the time before the pause may be received after it.
     message = scan.until(lambda message: message.header.stamp.to_sec() > paused)
     assert message.header.stamp.to_sec() >= resumed
-
-
-def test_markers_have_wall_time(server: Any, ros: Any) -> None:
-    markers = ros.topic("/flatland_server/debug/model/robot", MarkerArray)
-    ros.move("robot", (1.0, 0.0, 0.0))
-    for _ in range(2):
-        for marker in markers.next().markers:
-            assert_current(marker.header.stamp)
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
-from free_ports import free_port
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from programs import run_program
@@ -30,11 +30,15 @@ def world(write_world: Callable[..., Path]) -> Path:
 
 
 @pytest.fixture(scope="module")
-def url(module_launcher: Any, world: Path) -> str:
+def server(module_launcher: Any, world: Path) -> Any:
     """A node with the viewer on any free port."""
-    server = module_launcher.server(
+    return module_launcher.server(
         world, web=True, web_port=0, if_blocked="refuse", model_path=world.parent
     )
+
+
+@pytest.fixture(scope="module")
+def url(server: Any) -> str:
     return str(server.wait_for_line(PORT_LINE)[1])
 
 
@@ -168,18 +172,17 @@ def test_earlier_states_set_the_clock_back_and_keep_topics_connected(
 # -- the start of the viewer -----------------------------------------------------------------
 
 
-def test_a_restarted_simulator_is_shown_at_the_same_address(launcher: Any, world: Path) -> None:
-    port = free_port()
-    first = launcher.server(world, web=True, web_port=port)
-    url = first.wait_for_line(PORT_LINE)[1]
+def test_a_restarted_simulator_is_shown_at_the_same_address(
+    module_launcher: Any, server: Any, url: str, world: Path
+) -> None:
+    """The last test of this file: it ends the server."""
     with WebClient(url) as client:
-        assert client.pose("robot")
         # The new node has the name of the first one, which ends, and takes its port.
-        second = launcher.start(world_path=world, web=True, web_port=port)
+        second = module_launcher.start(world_path=world, web=True, web_port=urlsplit(url).port)
         with pytest.raises(ConnectionError):
             client.until("the end of the connection", lambda: False)
-    assert first.wait() == 1
-    (line,) = (line for line in first.lines if "[FATAL]" in line)
+    assert server.wait() == 1
+    (line,) = (line for line in server.lines if "[FATAL]" in line)
     assert re.search(
         r'another node has taken the name "/flatland_server" on the ROS master at \S+: this one '
         r"ends$",
@@ -189,7 +192,7 @@ def test_a_restarted_simulator_is_shown_at_the_same_address(launcher: Any, world
     with WebClient(url) as client:
         assert client.pose("robot") == pytest.approx((1, 2, 0))
     assert second.stop() == 0
-    assert "Traceback" not in first.output + second.output
+    assert "Traceback" not in server.output + second.output
 
 
 def test_without_the_viewer_its_modules_are_not_imported() -> None:

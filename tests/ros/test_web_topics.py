@@ -6,6 +6,7 @@ import struct
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from queue import Queue
 from typing import Any
 
 import numpy as np
@@ -19,10 +20,6 @@ from tf2_msgs.msg import TFMessage
 from waiting import TIMEOUT
 from web_client import WebClient
 
-from flatland.node.foreign_topics.topics import _WatchedTopic
-from flatland.ros.graph import Graph
-from flatland.ros.transport.registrar import Registrar
-from flatland.ros.transport.ros_transport import RosTransport
 from flatland.web.encoding import GRID, MARKS
 
 NODE = "/flatland_server"
@@ -185,49 +182,24 @@ def test_subscriptions_exist_only_while_a_client_looks(
     eventually("no subscriptions", lambda: subscribed() == set())
 
 
-def test_the_list_follows_publishers(client: TopicClient, publish: Any) -> None:
-    publisher = publish("/short_lived", Float64(1))
-    assert client.topic("/short_lived")["drawn_as"] is None
-    client.look(topic_values=["/short_lived"])
-    publisher.unregister()
-    client.until_status("/short_lived", "no publisher")
-    client.look(topic_values=[])
-    names = lambda: [each["topic"] for each in client.last("topics")["topics"]]  # noqa: E731
-    client.until("no topic", lambda: "/short_lived" not in names())
-
-
-def test_goals_and_initial_poses_are_those_of_rviz(
-    client: TopicClient, ros: Any, eventually: Any
-) -> None:
-    received: dict[str, list[Any]] = {"/move_base_simple/goal": [], "/r2/initialpose": []}
-    types = (PoseStamped, PoseWithCovarianceStamped)
+def test_goals_and_initial_poses_are_those_of_rviz(client: TopicClient, ros: Any) -> None:
+    received: Queue[Any] = Queue()
     subscribers = [
-        rospy.Subscriber(name, kind, messages.append)
-        for (name, messages), kind in zip(received.items(), types, strict=True)
+        rospy.Subscriber("/move_base_simple/goal", PoseStamped, received.put),
+        rospy.Subscriber("/r2/initialpose", PoseWithCovarianceStamped, received.put),
     ]
     topics = {
         "goal": ["/move_base_simple/goal"],
         "initial_pose": ["/initialpose", "/r2/initialpose"],
     }
     client.until("the topics", lambda: client.last("topics").get("pose_topics") == topics)
-    pose = {"pose": [1, 2, 0.5]}
-    for purpose, topic in (("goal", "/move_base_simple/goal"), ("initial_pose", "/r2/initialpose")):
-        assert client.do("publish_pose", purpose=purpose, topic=topic, **pose) == {"received": True}
-    eventually("both poses", lambda: all(received.values()))
-    (goal,), (initial,) = received.values()
-    assert goal.header.frame_id == initial.header.frame_id == "map"
-    assert goal.header.stamp.to_sec() > 0
-    for position in (goal.pose.position, initial.pose.pose.position):
+    for purpose, listed in topics.items():
+        pose = {"purpose": purpose, "topic": listed[-1], "pose": [1, 2, 0.5]}
+        assert client.do("publish_pose", **pose) == {"received": True}
+        message = received.get(timeout=TIMEOUT)
+        assert message.header.frame_id == "map"
+        position = (message.pose if purpose == "goal" else message.pose.pose).position
         assert (position.x, position.y) == (1, 2)
-    assert goal.pose.orientation.z == pytest.approx(np.sin(0.25))
-    covariance = np.zeros((6, 6))
-    covariance[0, 0] = covariance[1, 1] = 0.25
-    covariance[5, 5] = (np.pi / 12) ** 2
-    np.testing.assert_allclose(np.reshape(initial.pose.covariance, (6, 6)), covariance)
-    alone = client.do("publish_pose", purpose="initial_pose", topic="/initialpose", **pose)
-    assert alone == {"received": False}
-    error = client.refused("publish_pose", purpose="goal", topic="/cmd_vel", **pose)
-    assert error == 'no node subscribes to poses on "/cmd_vel"'
     for subscriber in subscribers:
         subscriber.unregister()
 
@@ -271,23 +243,3 @@ def test_what_a_page_uses_gives_way_to_a_plugin(
     client.until("the next grid", lambda: client.cells[number].tolist() == [[100, 0]])
     ros.delete("listener")
     client.do("publish_pose", **goal)
-
-
-def test_a_topic_to_which_a_plugin_subscribes_is_shared(ros: Any) -> None:
-    """All subscribers of a node for a topic have the same message class."""
-    registrar = Registrar()
-    transport = RosTransport(registrar)
-    graph = Graph("/flatland_tests")
-    used = [
-        transport.subscribe("/plain_grid", OccupancyGrid, lambda _message: None),
-        transport.subscribe("/number", Float64, lambda _message: None),
-    ]
-    grid = _WatchedTopic(transport, graph, "/plain_grid", "nav_msgs/OccupancyGrid", is_drawn=True)
-    assert grid.status == "no message received"
-    other = _WatchedTopic(transport, graph, "/number", "nav_msgs/Path", is_drawn=True)
-    assert "has the type std_msgs/Float64 already" in other.status
-    unknown = _WatchedTopic(transport, graph, "/unknown", "no_such_msgs/Thing", is_drawn=False)
-    assert unknown.status == "the message package of no_such_msgs/Thing is not installed"
-    for each in (*used, grid, other, unknown):
-        each.close()
-    registrar.close(TIMEOUT)

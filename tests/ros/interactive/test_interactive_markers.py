@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -24,7 +22,6 @@ from visualization_msgs.msg import (
 )
 
 SERVER = "/interactive_model_markers"
-NAN = math.nan
 
 DRIVER = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
@@ -66,58 +63,27 @@ def planar(pose: Pose) -> tuple[float, float, float]:
 class Client:
     """Publishes feedback like RViz."""
 
-    def __init__(self, ros: Any, name: str = "/rviz/Move Objects") -> None:
-        self._ros = ros
-        self._name = name
+    def __init__(self, ros: Any) -> None:
         self._publisher = ros.publisher(f"{SERVER}/feedback", InteractiveMarkerFeedback)
 
     def send(
         self,
         event: int,
-        pose: tuple[float, float, float] | Pose = (1, 2, 0.5),
-        *,
+        pose: tuple[float, float, float] = (1, 2, 0.5),
         marker: str = "rob",
-        frame: str = "map",
-        **fields: Any,
+        menu_entry: int = 0,
     ) -> None:
         """Publishes feedback."""
         feedback = InteractiveMarkerFeedback(
-            client_id=self._name, marker_name=marker, event_type=event, control_name="move_xy"
+            client_id="/rviz/Move Objects",
+            marker_name=marker,
+            event_type=event,
+            control_name="move_xy",
+            menu_entry_id=menu_entry,
+            pose=pose_message(*pose),
         )
-        feedback.header.frame_id = frame
-        feedback.pose = pose if isinstance(pose, Pose) else pose_message(*pose)
-        for name, value in fields.items():
-            setattr(feedback, name, value)
+        feedback.header.frame_id = "map"
         self._publisher.publish(feedback)
-
-    def press(self, **options: Any) -> None:
-        self.send(InteractiveMarkerFeedback.MOUSE_DOWN, **options)
-
-    def drag(self, *pose: float, **options: Any) -> None:
-        self.send(InteractiveMarkerFeedback.POSE_UPDATE, pose, **options)
-
-    def release(self, *pose: float, **options: Any) -> None:
-        self.send(InteractiveMarkerFeedback.MOUSE_UP, pose, **options)
-
-
-class ContinuousDrag:
-    """Context manager that publishes the pose of a drag 30 times per second, like RViz."""
-
-    def __init__(self, client: Client, *pose: float, **options: Any) -> None:
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, args=(client, pose, options))
-
-    def _run(self, client: Client, pose: tuple[float, ...], options: dict[str, Any]) -> None:
-        while not self._stop.is_set():
-            client.drag(*pose, **options)
-            self._stop.wait(0.033)
-
-    def __enter__(self) -> None:
-        self._thread.start()
-
-    def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._thread.join()
 
 
 @pytest.fixture
@@ -144,21 +110,12 @@ def updates(ros: Any) -> Any:
     return topic
 
 
-def full_state(ros: Any, namespace: str = "") -> dict[str, InteractiveMarker]:
+def full_state(ros: Any) -> dict[str, InteractiveMarker]:
     """Returns the markers received by a new client."""
-    topic = ros.topic(f"{namespace}{SERVER}/update_full", InteractiveMarkerInit)
+    topic = ros.topic(f"{SERVER}/update_full", InteractiveMarkerInit)
     message = topic.next()
     topic.close()  # Otherwise, rospy passes this message to the next subscriber, too.
     return {marker.name: marker for marker in message.markers}
-
-
-def assert_moves_straight(truth: Any, pose: tuple[float, float, float]) -> None:
-    """Checks that the model is at its initial pose until it is at another one."""
-    is_there, is_at_start = moved(*pose), moved(1, 2, 0.5)
-    message = truth.next()
-    while not is_there(message):
-        assert is_at_start(message), planar(message.pose.pose)
-        message = truth.next()
 
 
 def moved(x: float, y: float, theta: float) -> Callable[[Odometry], bool]:
@@ -230,76 +187,21 @@ def test_models_are_added_moved_and_deleted(ros: Any) -> None:
     assert set(full_state(ros)) == {"rob"}
 
 
-def test_late_subscriber_receives_the_current_pose(ros: Any) -> None:
-    full_state(ros)
-    assert ros.move("rob", (-2, 0, 0)).success
-    assert planar(full_state(ros)["rob"].pose) == pytest.approx((-2, 0, 0), abs=1e-5)
-    ros.call("/pause", Empty)
-    assert ros.move("rob", (2, 0, 0)).success
-    assert planar(full_state(ros)["rob"].pose) == pytest.approx((2, 0, 0), abs=1e-5)
-
-
-def test_sequence_numbers_of_updates_have_no_gaps(ros: Any) -> None:
-    """RViz reinitializes when a number is missing, and initially waits for a matching state."""
-    update = updates(ros)
-    full = ros.topic(f"{SERVER}/update_full", InteractiveMarkerInit)
-    numbers = [update.next().seq_num]  # of a keep-alive message
-    for i in range(3):
-        assert ros.move("rob", (i, 0, 0)).success
-        numbers.append(update.until(lambda message: message.poses).seq_num)
-    assert numbers == list(range(numbers[0], numbers[0] + 4))
-    full.until(lambda message: message.seq_num == numbers[-1])
-
-
-def test_keep_alive_messages_are_published_while_paused(ros: Any) -> None:
-    before_the_first = time.monotonic()
-    update = updates(ros)
-    ros.call("/pause", Empty)
-    update.until(lambda message: message.type == InteractiveMarkerUpdate.KEEP_ALIVE)
-    messages = update.take(3)
-    assert {message.type for message in messages} == {InteractiveMarkerUpdate.KEEP_ALIVE}
-    # Half a second between two of them, however late they arrive, but for the one on connection.
-    assert time.monotonic() - before_the_first > 2 * 0.5 - 0.1
-
-
 # -- feedback ------------------------------------------------------------------------------
 
 
-def test_drag_pauses_and_release_moves(client: Client, paused: Any, truth: Any) -> None:
-    client.press()
-    with ContinuousDrag(client, 0, -1, 1.5):
-        paused.until(lambda message: message.data)
-        client.release(-1, -2, 2.5)
-    # Feedback after the release starts another drag, which times out.
-    truth.until(moved(-1, -2, 2.5))
-    twist = truth.next().twist.twist
-    assert (twist.linear.x, twist.linear.y, twist.angular.z) == pytest.approx((0, 0, 0), abs=1e-6)
-    paused.until(lambda message: not message.data)
-
-
-def test_click_does_not_move_and_release_without_a_drag_does(client: Client, truth: Any) -> None:
-    client.press()
-    client.release(1, 2, 0.5)
-    client.release(-2, -1, -0.5)
-    # From the initial pose straight to the last one.
-    assert_moves_straight(truth, (-2, -1, -0.5))
-
-
-def test_model_does_not_move_during_a_drag(
-    client: Client, ros: Any, paused: Any, truth: Any
-) -> None:
+def test_drag_pauses_and_release_moves(client: Client, ros: Any, paused: Any, truth: Any) -> None:
     update = updates(ros)
-    with ContinuousDrag(client, -3, -3, 1):
-        # Other clients receive the pose of the drag.
-        update.until(lambda m: m.poses and planar(m.poses[0].pose) == pytest.approx((-3, -3, 1)))
-        paused.until(lambda message: message.data)
-        assert planar(full_state(ros)["rob"].pose) == pytest.approx((-3, -3, 1))
-    # The drag timed out without a release: the marker returns to the model.
-    message = update.until(lambda m: m.poses and m.poses[0].pose.position.x > 0)
-    assert planar(message.poses[0].pose) == pytest.approx((1, 2, 0.5), abs=1e-5)
+    client.send(InteractiveMarkerFeedback.MOUSE_DOWN, (1, 2, 0.5))
+    client.send(InteractiveMarkerFeedback.POSE_UPDATE, (0, -1, 1.5))
+    paused.until(lambda message: message.data)
+    # Without a release, the drag ends, and the marker returns to the model.
+    update.until(lambda m: m.poses and planar(m.poses[0].pose) == pytest.approx((1, 2, 0.5)))
     paused.until(lambda message: not message.data)
-    client.release(-2, -1, -0.5)
-    assert_moves_straight(truth, (-2, -1, -0.5))
+    client.send(InteractiveMarkerFeedback.MOUSE_UP, (-1, -2, 2.5))
+    # From the initial pose straight to the last one.
+    while not moved(-1, -2, 2.5)(message := truth.next()):
+        assert moved(1, 2, 0.5)(message), planar(message.pose.pose)
 
 
 def test_menu_deletes_the_model(client: Client, ros: Any) -> None:
@@ -307,28 +209,7 @@ def test_menu_deletes_the_model(client: Client, ros: Any) -> None:
     assert ros.spawn("robot.model.yaml", "victim", "victim").success
     update.until(lambda message: message.markers)
     entry = full_state(ros)["victim"].menu_entries[0].id
-    client.send(InteractiveMarkerFeedback.MENU_SELECT, marker="victim", menu_entry_id=entry)
+    client.send(InteractiveMarkerFeedback.MENU_SELECT, marker="victim", menu_entry=entry)
     assert update.until(lambda message: message.erases).erases == ["victim"]
     assert not ros.delete("victim").success
-    assert set(full_state(ros)) == {"rob"}
-
-
-def test_invalid_feedback_is_ignored(client: Client, ros: Any, truth: Any, server: Any) -> None:
-    for pose in (pose_message(NAN, 0, 0), Pose(), pose_message(1e30, 0, 0)):
-        for event in (
-            InteractiveMarkerFeedback.MOUSE_DOWN,
-            InteractiveMarkerFeedback.POSE_UPDATE,
-            InteractiveMarkerFeedback.MOUSE_UP,
-            InteractiveMarkerFeedback.KEEP_ALIVE,
-            77,
-        ):
-            client.send(event, pose)
-    client.press(marker="ghost")
-    client.release(0, 0, 0, marker="ghost")
-    client.send(InteractiveMarkerFeedback.MENU_SELECT, marker="ghost", menu_entry_id=1)
-    client.send(InteractiveMarkerFeedback.MENU_SELECT, menu_entry_id=99)
-    client.release(0, 0, 0, frame="base_link")
-    server.wait_for_line('WARN.*"rob": ignoring a pose in frame "base_link"')
-    client.release(1, 1, 1, frame="/map")
-    assert_moves_straight(truth, (1, 1, 1))
     assert set(full_state(ros)) == {"rob"}

@@ -15,10 +15,11 @@ from raw_subscriber import RawSubscriber
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
 from std_srvs.srv import Empty, Trigger
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import InteractiveMarkerInit, Marker, MarkerArray
 from waiting import TIMEOUT
 
 from flatland.msg import DebugTopicList
+from flatland.srv import SetAppearance, SetAppearanceRequest
 
 DEBUG = "/flatland_server/debug"
 RATE = 20.0  # Hz, model markers
@@ -50,17 +51,10 @@ import flatland
 class Grow(flatland.WorldPlugin):
     def on_initialize(self, config):
         self.ros.advertise_service("grow", Trigger, self.grow)
-        self.ros.advertise_service("fill", Trigger, self.fill)
 
     def grow(self, request):
-        return self.add([[0, 0, 1, len(self.world.layer("growing").edges)]])
-
-    def fill(self, request):
-        return self.add([[0, 0, 1, i] for i in range(5000)])
-
-    def add(self, edges):
         layer = self.world.layer("growing")
-        layer.add_edges(np.array(edges, np.float32))
+        layer.add_edges(np.array([[0, 0, 1, len(layer.edges)]], np.float32))
         self.world.layer_changed(layer)
         return TriggerResponse(True, "")
 
@@ -87,11 +81,6 @@ def arm(ros: Any) -> Any:
     yield
     ros.call("/resume", Empty)
     ros.delete("arm")
-
-
-def markers_of(ros: Any, name: str) -> list[Marker]:
-    """Returns the first markers received by a new subscriber."""
-    return ros.topic(f"{DEBUG}/{name}", MarkerArray).next().markers
 
 
 def late_message(ros: Any, name: str, message_type: type[Any] = MarkerArray) -> Any:
@@ -126,7 +115,9 @@ def pose(marker: Marker) -> tuple[float, ...]:
 
 
 def test_layer_as_lines(ros: Any) -> None:
-    (marker,) = markers_of(ros, "layer/2d")
+    message = ros.topic(f"{DEBUG}/layer/2d", MarkerArray).next()
+    assert message._connection_header["latching"] == "1"
+    (marker,) = message.markers
     assert (marker.type, marker.action) == (Marker.LINE_LIST, Marker.ADD)
     assert marker.header.frame_id == "map"
     assert color(marker) == pytest.approx((0.1, 0.2, 0.3, 0.4))
@@ -136,14 +127,6 @@ def test_layer_as_lines(ros: Any) -> None:
     corners = [[-5, -5, 0], [5, -5, 0], [5, 5, 0], [-5, 5, 0]]
     lines = [points(marker)[i : i + 2] for i in range(0, 8, 2)]
     assert lines == [[corners[i], corners[(i + 1) % 4]] for i in range(4)]
-
-
-def test_layer_markers_have_the_pose_of_the_layer(ros: Any) -> None:
-    for name in ("layer/hall", "layer/hall_3d"):
-        (marker,) = markers_of(ros, name)
-        assert pose(marker) == pytest.approx((1, 2, 0.5))
-        assert {abs(x) for x, _y, _z in points(marker)} == {2.5}
-        assert color(marker) == (1, 1, 1, 1)
 
 
 def test_layer_is_published_once_and_when_it_changes(ros: Any) -> None:
@@ -161,22 +144,15 @@ def test_layer_is_published_once_and_when_it_changes(ros: Any) -> None:
     assert lines.rest() == walls.rest() == []
 
 
-def test_topics_are_latched(ros: Any, arm: None) -> None:
-    del arm
-    for name in ("layer/2d", "layer/2d_3d", "model/arm"):
-        message = ros.topic(f"{DEBUG}/{name}", MarkerArray).next()
-        assert message._connection_header["latching"] == "1"
-    message = ros.topic(f"{DEBUG}/topics", DebugTopicList).next()
-    assert message._connection_header["latching"] == "1"
-
-
 # -- models --------------------------------------------------------------------------------
 
 
 def test_model_as_footprints_and_joints(ros: Any, arm: None) -> None:
     del arm
     clock = ros.topic("/clock", Clock).next().clock
-    markers = markers_of(ros, "model/arm")
+    message = ros.topic(f"{DEBUG}/model/arm", MarkerArray).next()
+    assert message._connection_header["latching"] == "1"
+    markers = message.markers
     assert {marker.header.frame_id for marker in markers} == {"map"}
     assert {marker.action for marker in markers} == {Marker.ADD}
     assert len({(marker.ns, marker.id) for marker in markers}) == 4
@@ -235,7 +211,8 @@ LAYER_TOPICS = [
 
 def test_topics_are_listed(ros: Any) -> None:
     topics = ros.topic(f"{DEBUG}/topics", DebugTopicList)
-    assert topics.next().topics == LAYER_TOPICS
+    first = topics.next()
+    assert (first.topics, first._connection_header["latching"]) == (LAYER_TOPICS, "1")
     assert ros.spawn("ball.model.yaml", "one").success
     # A new subscriber may get the state before the change twice.
     message = topics.until(lambda message: message.topics != LAYER_TOPICS)
@@ -268,42 +245,6 @@ def test_deleted_model_deletes_its_markers_and_its_topic(ros: Any, eventually: A
     assert topic.rest() == []
 
 
-def test_model_that_is_deleted_and_spawned_again(ros: Any) -> None:
-    assert ros.spawn("ball.model.yaml", "one").success
-    topic = ros.topic(f"{DEBUG}/model/one", MarkerArray)
-    for x in (1, 2, 3):
-        assert ros.delete("one").success
-        assert ros.spawn("ball.model.yaml", "one", "", (x, 0, 0)).success
-        topic.until(lambda message, x=x: message.markers[0].pose.position.x == x)
-    # For longer than the delay after which the topic of a deleted model is closed.
-    for message in topic.take(10):
-        assert pose(message.markers[0]) == (3, 0, 0)
-    assert pose(late_message(ros, "model/one").markers[0]) == (3, 0, 0)
-    assert ros.delete("one").success
-
-
-def test_illegal_names_are_converted_with_a_warning(ros: Any, server: Any) -> None:
-    topics = ros.topic(f"{DEBUG}/topics", DebugTopicList)
-    topics.next()
-    names = ["my robot-1", "my_robot_1", "my-robot-1", "a/b", "Größe", "a//b"]
-    expected = ["my_robot_1", "my_robot_1_2", "my_robot_1_3", "a/b", "Gr__e", "a/b_2"]
-    for i, (name, legal) in enumerate(zip(names, expected, strict=True)):
-        answer = ros.spawn("ball.model.yaml", name, "", (i - 3, 0, 0))
-        assert answer.success, answer.message
-        message = topics.until(lambda message, i=i: len(message.topics) > len(LAYER_TOPICS) + i)
-        assert message.topics[-1] == f"model/{legal}"
-        (marker,) = markers_of(ros, f"model/{legal}")
-        assert marker.pose.position.x == i - 3
-    server.wait_for_line(
-        r'WARN.*model "my robot-1" is published on topic ".*/debug/model/my_robot_1"'
-    )
-    server.wait_for_line(r'WARN.*layer "bad heights" is published on topic')
-    assert 'model "a/b" is published' not in server.output
-    for name in names:
-        assert ros.delete(name).success
-    assert "Traceback" not in server.output
-
-
 # -- combined topics, used by RViz and the viewer ------------------------------------------
 
 
@@ -328,27 +269,6 @@ def test_layers_are_on_one_topic(ros: Any, topic: str, kind: int) -> None:
     assert {marker.type for marker in message.markers if marker.action == Marker.ADD} == {kind}
 
 
-def test_models_are_added_moved_and_deleted(ros: Any) -> None:
-    for name in ("one", "two"):
-        assert ros.spawn("ball.model.yaml", name).success
-    models = ros.topic(f"{DEBUG}/all_models", MarkerArray)
-    models.until(lambda message: marker_counts(message) == {"one": 1, "two": 1})
-    assert ros.spawn("ball.model.yaml", "three", pose=(1, 2, 0)).success
-    message = models.until(lambda message: "three" in marker_counts(message))
-    (marker,) = (marker for marker in message.markers if marker.ns == "three")
-    assert (marker.pose.position.x, marker.pose.position.y) == (1, 2)
-    assert marker.header.frame_id == "map"
-    assert ros.move("three", (-1, 0, 0)).success
-    models.until(lambda m: [k.pose.position.x for k in m.markers if k.ns == "three"] == [-1])
-    assert ros.delete("three").success
-    message = models.until(lambda message: "three" not in marker_counts(message))
-    assert message.markers[0].action == Marker.DELETEALL
-    # The deletion is repeated only for a short time, because RViz then recreates all markers.
-    models.until(lambda message: message.markers[0].action == Marker.ADD)
-    for name in ("one", "two"):
-        assert ros.delete(name).success
-
-
 def test_pause_state_is_published(ros: Any) -> None:
     paused = ros.topic("/flatland_server/paused", Bool)
     assert paused.next().data is False
@@ -360,28 +280,28 @@ def test_pause_state_is_published(ros: Any) -> None:
     assert paused.rest() == []
 
 
-def test_late_subscriber_receives_a_pause_right_after_its_first_message(ros: Any) -> None:
-    """The world is paused again before the resumed state was published to all subscribers."""
-    paused = ros.topic("/flatland_server/paused", Bool)
-    assert paused.next().data is False
-    for _ in range(10):
-        # The pause was published to all; its end is published with the next tick.
-        ros.call("/resume", Empty)
-        topic = "/flatland_server/paused"
-        with closing(RawSubscriber(ros.master, topic, Bool, name="/late")) as late:
-            while late.next().data:
-                pass
-            ros.call("/pause", Empty)
-            while not late.next().data:
-                pass
-    ros.call("/resume", Empty)
+def test_markers_and_handles_follow_the_appearance(ros: Any, arm: None) -> None:
+    del arm
+    blue = (0.0, 0.0, 1.0, 0.75)
+    markers = ros.topic(f"{DEBUG}/model/arm", MarkerArray)
+    combined = ros.topic(f"{DEBUG}/all_models", MarkerArray)
+    handles = ros.topic("/interactive_model_markers/update_full", InteractiveMarkerInit)
+    request = SetAppearanceRequest(model="arm", body="base", color=blue)
+    answer = ros.call("/set_appearance", SetAppearance, request)
+    assert (answer.success, answer.message) == (True, "")
+    assert request.visible == SetAppearanceRequest.KEEP
+    request = SetAppearanceRequest(model="arm", body="arm", visible=SetAppearanceRequest.HIDE)
+    assert ros.call("/set_appearance", SetAppearance, request).success
+    bodies = (Marker.SPHERE_LIST, Marker.LINE_STRIP)
 
+    def colors(markers: Any) -> list[Any]:
+        return [color(marker) for marker in markers if marker.type in bodies]
 
-def test_a_layer_with_many_edges(ros: Any) -> None:
-    """Its messages are larger than the buffers of a connection."""
-    assert ros.call("/fill", Trigger).success
-    for name, per_edge in (("layer/growing", 2), ("layer/growing_3d", 6)):
-        (marker,) = late_message(ros, name).markers
-        assert len(marker.points) >= 5000 * per_edge
-        assert points(marker)[-1][0] in (0, 1)
-        assert max(point.y for point in marker.points) == 4999
+    markers.until(lambda message: colors(message.markers) == [blue])
+    combined.until(lambda message: colors(message.markers) == [blue])
+    # Behind the name of the model are the outlines of its bodies.
+    handles.until(
+        lambda message: (
+            [color(each) for each in message.markers[0].controls[-1].markers[1:]] == [blue]
+        )
+    )

@@ -73,14 +73,6 @@ def pair(request: pytest.FixtureRequest) -> Iterator[Pair]:
     pair.reader.close()
 
 
-def test_fast_reader_receives_all_messages(pair: Pair) -> None:
-    for number in range(500):
-        pair.write(number)
-        assert pair.read() == number
-    assert pair.transport.stat_num_msg == 500
-    assert pair.transport.stat_bytes == 500 * 1008
-
-
 def test_slow_reader_receives_the_newest_messages(pair: Pair) -> None:
     # A write that waited for this reader would never return.
     for number in range(2000):
@@ -93,6 +85,10 @@ def test_slow_reader_receives_the_newest_messages(pair: Pair) -> None:
     queue_size = pair.outbox._queue.maxlen
     assert queue_size is not None
     assert numbers[-queue_size:] == list(range(2000 - queue_size, 2000))
+    # All further messages are received, since the reader has caught up.
+    for number in range(2000, 2100):
+        pair.write(number)
+        assert pair.read() == number
 
 
 def test_message_larger_than_the_socket_buffer_is_complete(pair: Pair) -> None:
@@ -103,16 +99,6 @@ def test_message_larger_than_the_socket_buffer_is_complete(pair: Pair) -> None:
     wait_until("count of both messages", lambda: pair.transport.stat_num_msg == 2)
 
 
-def test_writes_continue_after_the_reader_has_caught_up(pair: Pair) -> None:
-    for number in range(100):
-        pair.write(number)
-    while pair.read() != 99:
-        pass
-    for number in range(100, 200):
-        pair.write(number)
-        assert pair.read() == number
-
-
 def test_closed_reader_ends_the_connection(pair: Pair) -> None:
     for number in range(100):
         pair.write(number)
@@ -121,9 +107,3 @@ def test_closed_reader_ends_the_connection(pair: Pair) -> None:
     wait_until("end of the connection", lambda: pair.transport.done)
     with pytest.raises(TransportTerminated):
         pair.write(100)
-
-
-def test_write_to_a_closed_connection_raises(pair: Pair) -> None:
-    pair.transport.close()
-    with pytest.raises(TransportTerminated):
-        pair.write(1)
