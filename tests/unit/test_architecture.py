@@ -207,8 +207,3 @@ def test_the_room_of_the_node_imports_no_module_of_ros() -> None:
     )
     done = run_program([sys.executable, "-c", code])
     assert done.stdout == "[]\n", done.stdout + done.stderr
-
-
-def test_the_exceptions_are_used() -> None:
-    late = {(found.room, found.target) for found in run_time_imports() if found.kind == "late"}
-    assert late >= LATE

@@ -189,17 +189,11 @@ def test_the_extras_are_those_of_the_project(checkout: Path) -> None:
         assert not package.extra or f"\n{package.extra} = [" in project
 
 
-@pytest.fixture
-def clone(tmp_path: Path, checkout: Path) -> Path:
-    """The beginning of a clone without the extension."""
+def test_a_clone_without_extension_names_what_it_hides(tmp_path: Path, checkout: Path) -> None:
     clone = tmp_path / "clone"
     (clone / "flatland").mkdir(parents=True)
     for name in ("__init__.py", "requirements.py", "version.py"):
         shutil.copy(checkout / "flatland" / name, clone / "flatland" / name)
-    return clone
-
-
-def test_a_clone_without_extension_names_what_it_hides(clone: Path, checkout: Path) -> None:
     command = [sys.executable, "-c", "import flatland; print(flatland.__file__)"]
     done = run_program(command, cwd=clone)
     assert done.returncode == 1

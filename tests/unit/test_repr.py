@@ -42,11 +42,8 @@ def test_a_world_names_its_file_and_time(files: Any) -> None:
     assert repr(world) == f"<World '{folder}/world.yaml' at 0.015 s, layers: 2, models: 1>"
     world.close()
     assert repr(world) == f"<World '{folder}/world.yaml', closed>"
-
-
-def test_a_world_without_a_file() -> None:
-    with flatland.World(seed=1) as world:
-        assert repr(world) == "<World '' at 0.000 s, layers: 0, models: 0>"
+    with flatland.World(seed=1) as without_file:
+        assert repr(without_file) == "<World '' at 0.000 s, layers: 0, models: 0>"
 
 
 def test_a_deleted_model_has_no_pose(files: Any) -> None:

@@ -26,21 +26,9 @@ def test_the_robot_is_free_and_all_sensors_publish(sensors: flatland.World) -> N
     assert not sensors.contacts
     for topic, output in outputs.items():
         assert output.latest is not None, topic
-
-
-def test_scans_have_intensities_and_depend_on_the_seed(checkout: Path) -> None:
-    path = str(checkout / "worlds/sensors/world.yaml")
-    scans = []
-    for seed in (1, 1, 2):
-        with flatland.World.from_yaml(path, seed=seed) as world:
-            output = world.output("/scan")
-            world.step(100)
-            assert output.latest is not None
-            scans.append(output.latest)
-    assert scans[0].ranges.tobytes() == scans[1].ranges.tobytes()
-    assert scans[0].ranges.tobytes() != scans[2].ranges.tobytes()
-    is_hit = np.isfinite(scans[0].ranges)
-    assert np.count_nonzero(scans[0].intensities) > 0.9 * np.count_nonzero(is_hit) > 0
+    scan = outputs["/scan"].latest
+    is_hit = np.isfinite(scan.ranges)
+    assert np.count_nonzero(scan.intensities) > 0.9 * np.count_nonzero(is_hit) > 0
 
 
 def test_labels_are_those_of_the_places_that_the_beams_hit(sensors: flatland.World) -> None:

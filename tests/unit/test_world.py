@@ -20,6 +20,10 @@ joints:
   - {name: j, type: weld, angle: 0.3,
      bodies: [{name: base, anchor: [0.0998334, 0.9950042]}, {name: arm, anchor: [0, 0]}]}
 """
+DRIVEN = """
+bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+plugins: [{name: drive, type: DiffDrive, body: base}]
+"""
 
 
 class Probe(ModelPlugin):
@@ -70,6 +74,11 @@ def probe(files, declare_plugins):
     return Probe
 
 
+@pytest.fixture
+def world(empty_world):
+    return empty_world
+
+
 @pytest.mark.parametrize("with_pre_solve", [False, True])
 @pytest.mark.parametrize(
     ("iterations", "parted"),
@@ -108,8 +117,7 @@ def test_time_is_exact_after_many_steps(files):
     assert world.timekeeper.max_step_size == 0.001
 
 
-def test_hooks_run_in_order_with_the_specified_times(files, probe):
-    world = files.load("{properties: {}, layers: []}")
+def test_hooks_run_in_order_with_the_specified_times(probe, world):
     world.spawn_model("probe.model.yaml", "a")
     world.step(2)
     dt = 5_000_000
@@ -125,8 +133,7 @@ def test_hooks_run_in_order_with_the_specified_times(files, probe):
     ]
 
 
-def test_contact_hooks_have_the_time_before_the_step(files, probe):
-    world = files.load("{properties: {}, layers: []}")
+def test_contact_hooks_have_the_time_before_the_step(probe, world):
     world.spawn_model("probe.model.yaml", "a")
     world.spawn_model("minimal.model.yaml", "b", pose=(0.3, 0, 0))
     world.step()
@@ -137,8 +144,7 @@ def test_contact_hooks_have_the_time_before_the_step(files, probe):
     assert world.contacts == []
 
 
-def test_pause_stops_hooks_and_time(files, probe):
-    world = files.load("{properties: {}, layers: []}")
+def test_pause_stops_hooks_and_time(probe, world):
     world.spawn_model("probe.model.yaml", "a")
     world.pause()
     assert world.paused
@@ -153,9 +159,8 @@ def test_pause_stops_hooks_and_time(files, probe):
     assert not world.paused
 
 
-def test_a_move_is_rigid_and_sets_velocities_to_zero(files):
+def test_a_move_is_rigid_and_sets_velocities_to_zero(files, world):
     files.write("two.model.yaml", TWO_BODIES)
-    world = files.load("{properties: {}, layers: []}")
     model = world.spawn_model("two.model.yaml", "m", pose=(5, 5, 0.7))
     base, arm = model.bodies
     base.set_velocity(1, 2, 3)
@@ -170,9 +175,8 @@ def test_a_move_is_rigid_and_sets_velocities_to_zero(files):
     assert base.pose == pytest.approx((-1, -2, 0.1 + math.pi / 2), abs=1e-4)
 
 
-def test_a_move_that_is_invalid_for_one_body_moves_no_body(files):
+def test_a_move_that_is_invalid_for_one_body_moves_no_body(files, world):
     files.write("two.model.yaml", TWO_BODIES)
-    world = files.load("{properties: {}, layers: []}")
     model = world.spawn_model("two.model.yaml", "m", pose=(5, 5, 0))
     before = [body.pose for body in model.bodies]
     # The arm, 1 m to the left of the base, would be beyond the range of the physics.
@@ -183,16 +187,15 @@ def test_a_move_that_is_invalid_for_one_body_moves_no_body(files):
     assert [body.pose for body in model.bodies] == before
 
 
-def test_a_request_to_a_closing_world_fails(files):
+def test_a_request_to_a_closing_world_fails(world):
     """A request that is made while the world is closing must not wait forever."""
-    world = files.load("{properties: {}, layers: []}")
     future = world.post(lambda: world.spawn_model("minimal.model.yaml", "m"))
     world.close()
     with pytest.raises(WorldError, match="the world is closed"):
         future.result(timeout=0)
 
 
-def test_a_spawn_that_fails_late_leaves_nothing_behind(files, probe):
+def test_a_spawn_that_fails_late_leaves_nothing_behind(files, probe, world):
     files.write(
         "bad.model.yaml",
         """
@@ -207,7 +210,6 @@ def test_a_spawn_that_fails_late_leaves_nothing_behind(files, probe):
           - {name: bad, type: "test::Probe", unknown_key: 1}
         """,
     )
-    world = files.load("{properties: {}, layers: []}")
     with pytest.raises(flatland.PluginError) as caught:
         world.spawn_model("bad.model.yaml", "m")
     assert str(caught.value).startswith(
@@ -225,8 +227,7 @@ def test_a_spawn_that_fails_late_leaves_nothing_behind(files, probe):
     assert probe.calls == [("good", "shutdown", 0)]
 
 
-def test_delete_shuts_down_plugins_and_releases_everything(files, probe):
-    world = files.load("{properties: {}, layers: []}")
+def test_delete_shuts_down_plugins_and_releases_everything(probe, world):
     model = world.spawn_model("probe.model.yaml", "a")
     body = model.bodies[0]
     world.delete_model("a")
@@ -241,8 +242,7 @@ def test_delete_shuts_down_plugins_and_releases_everything(files, probe):
 
 
 @pytest.mark.parametrize("hook", ["before", "after", "begin", "pre_solve"])
-def test_requests_of_a_hook_run_after_the_step(files, probe, hook):
-    world = files.load("{properties: {}, layers: []}")
+def test_requests_of_a_hook_run_after_the_step(probe, world, hook):
     world.spawn_model("probe.model.yaml", "a")
     world.spawn_model("minimal.model.yaml", "b", pose=(0.3, 0, 0))
     seen = []
@@ -276,8 +276,7 @@ def test_step_and_close_raise_in_a_hook(files, probe, caplog):
     assert world.timekeeper.sim_time_ns == 10_000_000
 
 
-def test_posted_actions_run_in_order_even_while_paused(files):
-    world = files.load("{properties: {}, layers: []}")
+def test_posted_actions_run_in_order_even_while_paused(world):
     world.pause()
     done = []
     futures = [world.post(lambda i=i: done.append(i) or i) for i in range(5)]
@@ -289,8 +288,7 @@ def test_posted_actions_run_in_order_even_while_paused(files):
     assert isinstance(failing.exception(), ZeroDivisionError)
 
 
-def test_a_closed_world_raises_and_may_be_closed_again(files, probe):
-    world = files.load("{properties: {}, layers: []}")
+def test_a_closed_world_raises_and_may_be_closed_again(probe, world):
     body = world.spawn_model("probe.model.yaml", "a").bodies[0]
     with world as same:
         assert same is world
@@ -314,12 +312,7 @@ def test_a_closed_world_raises_and_may_be_closed_again(files, probe):
 
 def test_a_command_of_a_hook_takes_effect_in_the_same_step(files, probe):
     world = files.load_model(
-        """
-        bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
-        plugins:
-          - {name: p, type: "test::Probe"}
-          - {name: drive, type: DiffDrive, body: base}
-        """
+        DRIVEN.replace("[{name: drive", '[{name: p, type: "test::Probe"}, {name: drive')
     )
     command = world.command("/cmd_vel")
     probe.hook = "before"
@@ -328,15 +321,8 @@ def test_a_command_of_a_hook_takes_effect_in_the_same_step(files, probe):
     assert world.model("robot").bodies[0].velocity == (1.0, 0.0, 0.0)
 
 
-def test_ports_are_found_by_topic(files):
-    files.write(
-        "driven.model.yaml",
-        """
-        bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
-        plugins: [{name: drive, type: DiffDrive, body: base}]
-        """,
-    )
-    world = files.load("{properties: {}, layers: []}")
+def test_ports_are_found_by_topic(files, world):
+    files.write("driven.model.yaml", DRIVEN)
     world.spawn_model("driven.model.yaml", "a", "r1")
     odometry = world.output("/r1/odometry/filtered")
     assert odometry.latest is None
@@ -379,22 +365,8 @@ def test_transforms_are_sent_only_to_observers_that_want_them(files):
         def transforms_sent(self, transforms):
             self.batches.append(list(transforms))
 
-    files.write(
-        "robot.model.yaml",
-        """
-        bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
-        plugins: [{type: DiffDrive, name: drive, body: base}]
-        """,
-    )
     eager, idle = Observer(True), Observer(False)
-    world = files.load(
-        """
-        properties: {}
-        layers: [{name: 2d}]
-        models: [{name: r1, model: robot.model.yaml}]
-        """,
-        observers=[eager, idle],
-    )
+    world = files.load_model(DRIVEN, observers=[eager, idle])
     world.step(2)
     assert idle.batches == []
     assert [[each.stamp for each in batch] for batch in eager.batches] == [[0], [5_000_000]]

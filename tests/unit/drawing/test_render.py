@@ -81,11 +81,9 @@ class TestWalls:
         red = points_like(pixels, RED, 60)
         inside = red[np.abs(red - 5).max(axis=1) < 4.9]  # without the outer boundary of the map
         assert distance_from_walls(inside).max() < 1.5 / SCALE
-        along = np.arange(1.05, 8.95, 0.06)  # three pixels
-        for x, y in [(along, 1), (along, 9), (1, along), (9, along)]:
-            xs, ys = np.broadcast_arrays(x, y)
-            for i in range(len(along)):
-                assert np.hypot(*(inside - (xs[i], ys[i])).T).min() < 1.5 / SCALE
+        for along in np.arange(1.05, 8.95, 0.3):
+            for point in [(along, 1), (along, 9), (1, along), (9, along)]:
+                assert np.hypot(*(inside - point).T).min() < 1.5 / SCALE
         assert tuple(at(pixels, 6, 6)) == FLOOR
         assert tuple(at(pixels, 0.5, 5)) == FLOOR
 
@@ -97,21 +95,15 @@ class TestWalls:
         world = room_world(files)
         assert (plan(world, layers=[]) == FLOOR).all()
         assert (plan(world, layers=["walls"]) == plan(world)).all()
-        with pytest.raises(flatland.WorldError, match='"roof" does not exist'):
-            world.draw(layers=["roof"])
 
     def test_edges_of_a_layer_are_one_collection(self, files):
         """One artist per edge would take half a minute for a large map."""
-        rng = np.random.default_rng(0)
-        starts = rng.uniform(0, 100, (5_000, 2))
-        edges = np.hstack([starts, starts + rng.normal(0, 0.3, starts.shape)])
-        np.savetxt(files.folder / "map.dat", edges)
+        np.savetxt(files.folder / "map.dat", np.random.default_rng(0).uniform(0, 9, (1000, 4)))
         files.write("map.yaml", "{type: line_segments, data: map.dat, scale: 1, origin: [0, 0, 0]}")
         world = files.load("{properties: {}, layers: [{name: walls, map: map.yaml}]}")
         (axes,) = drawing.make_figure(world).axes
-        assert 5_000 in [len(part.get_paths()) for part in axes.collections]
+        assert 1000 in [len(part.get_paths()) for part in axes.collections]
         assert len(axes.get_children()) < 30
-        assert is_like(world.draw(), (127, 127, 127)).sum() > 5_000
 
 
 class TestModels:
@@ -218,9 +210,7 @@ class TestScans:
         # Hits on all four walls.
         assert scan.min(axis=0) == pytest.approx((1, 1), abs=0.1)
         assert scan.max(axis=0) == pytest.approx((9, 9), abs=0.1)
-
-    def test_scanned_area_is_tinted(self, files):
-        pixels = plan(room_world(files, body() + laser()))
+        # The scanned area is tinted.
         assert tuple(at(pixels, 6, 6)) != FLOOR
         assert tuple(at(pixels, 0.5, 6)) == FLOOR
 
@@ -231,10 +221,8 @@ class TestScans:
 
 
 def test_drawing_does_not_modify_the_simulation(files):
-    model = body() + laser(", noise_std_dev: 0.1") + "\n- {type: DiffDrive, name: d, body: base}"
-    model = model.replace("plugins: [", "plugins:\n- ").replace(
-        "]\n- {type: Diff", "\n- {type: Diff"
-    )
+    drive = "{type: DiffDrive, name: d, body: base}"
+    model = body() + laser(", noise_std_dev: 0.1").replace("plugins: [", f"plugins: [{drive}, ")
     seen: list[list[bytes]] = []
     for drawn in (False, True):
         world = room_world(files, model, seed=7)
@@ -275,7 +263,7 @@ class TestThreads:
 
         def run() -> None:
             try:
-                images.extend(plan(world) for _ in range(3))
+                images.extend(plan(world) for _ in range(2))
             except BaseException as error:
                 failures.append(error)
 
@@ -285,8 +273,8 @@ class TestThreads:
         while any(thread.is_alive() for thread in threads):
             world.step(10)
         assert not failures
-        assert len(images) == 6
-        assert inside_a_step == [False] * 6
+        assert len(images) == 4
+        assert inside_a_step == [False] * 4
         # The robot is at rest, and its laser has no noise.
         assert all((image == images[0]).all() for image in images)
 
@@ -314,11 +302,10 @@ class TestImage:
 
     def test_default_size_depends_on_the_view(self, files):
         world = room_world(files)
-        high, wide, _ = world.draw(axes=False).shape
-        assert (high, wide) == (900, 900)
+        assert world.draw(axes=False).shape == (900, 900, 3)
         assert world.draw(axes=False, view=(0, 0, 130, 10)).shape == (200, 1300, 3)
-        once, twice = world.draw(), world.draw(dpi=200)
-        assert np.array(twice.shape[:2]) == pytest.approx(2 * np.array(once.shape[:2]), abs=2)
+        once, half = world.draw(), world.draw(dpi=50)
+        assert np.array(half.shape[:2]) == pytest.approx(np.array(once.shape[:2]) / 2, abs=1)
 
     def test_scale_is_the_same_along_both_axes(self, files):
         figure = drawing.make_figure(room_world(files), size=(800, 500))
@@ -392,12 +379,6 @@ class TestImage:
     def test_invalid_options_raise(self, empty_world, options, message):
         with pytest.raises(ValueError, match=message):
             empty_world.draw(**options)
-
-    def test_closed_world_raises(self, files):
-        world = room_world(files)
-        world.close()
-        with pytest.raises(flatland.WorldError, match="the world is closed"):
-            world.draw()
 
 
 class TestSave:

@@ -218,12 +218,6 @@ def test_a_gif_and_an_animation_are_read(tmp_path: Path) -> None:
         np.testing.assert_allclose(read_grey_image(str(path)), GREY, atol=1)
 
 
-def test_a_tiff_that_lies_on_its_side_is_turned(tmp_path: Path) -> None:
-    path = tmp_path / "map.tif"
-    Pillow.fromarray(GREY).save(path, tiffinfo={0x0112: 6})
-    np.testing.assert_array_equal(read_grey_image(str(path)), np.rot90(GREY, -1))
-
-
 def test_a_large_image_is_read_without_a_warning(tmp_path: Path, monkeypatch: Any) -> None:
     # Pillow warns about images that are larger than this, and refuses twice the size.
     monkeypatch.setattr(Pillow, "MAX_IMAGE_PIXELS", 500)

@@ -44,19 +44,14 @@ def test_a_file_without_segments(tmp_path: Path, text: str) -> None:
 )
 @pytest.mark.parametrize("before", [0, 1, 7])
 def test_an_error_contains_the_line_number(tmp_path: Path, bad: str, before: int) -> None:
-    text = "# head\n\n" + "1 2 3 4\n" * before + bad + "\n1 2 3 4\n"
-    line = 3 + before
+    text = "# head\n\n" + "1 2 3 4\n" * before + bad + "\n1 2 3 4\n1 2\n"
+    line = 3 + before  # of the first of two invalid lines
     with pytest.raises(MapFileError) as caught:
         read(tmp_path, text)
     assert str(caught.value) == (
         f'Flatland File: Failed to read line segment from line {line}, in file "lines.dat"'
         f" [{tmp_path / 'lines.dat'}:{line}]"
     )
-
-
-def test_an_error_refers_to_the_first_invalid_line(tmp_path: Path) -> None:
-    with pytest.raises(MapFileError, match="line segment from line 2,"):
-        read(tmp_path, "1 2 3 4\n1 2 nan 4\n1 2\n")
 
 
 def test_a_binary_file_is_rejected(tmp_path: Path) -> None:
@@ -71,6 +66,6 @@ def test_unreadable_files(tmp_path: Path, name: str) -> None:
 
 
 def test_numbers_are_read_exactly(tmp_path: Path) -> None:
-    segments = np.random.default_rng(3).normal(0, 100, (20_000, 4))
+    segments = np.random.default_rng(3).normal(0, 100, (1000, 4))
     text = "\n".join(" ".join(map(repr, row)) for row in segments.tolist())
     np.testing.assert_array_equal(read(tmp_path, text), segments)

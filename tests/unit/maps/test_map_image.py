@@ -42,13 +42,6 @@ def drawn_walls() -> Image:
     return mask
 
 
-def test_without_simplification_the_boundary_is_exact() -> None:
-    mask = drawn_walls()
-    edges, exact = image_edges(mask, 0.05, simplify=0)
-    np.testing.assert_array_equal(edges, boundary_edges(mask, 0.05))
-    assert exact == len(edges)
-
-
 def distance_to_edges(points: npt.NDArray[np.floating], edges: npt.NDArray[np.floating]) -> float:
     """Returns the maximum distance of a point from its nearest edge."""
     start, along = edges[:, :2], edges[:, 2:] - edges[:, :2]

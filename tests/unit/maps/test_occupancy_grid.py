@@ -47,8 +47,8 @@ class Maps:
         return self.source("{name: walls, map: map.yaml}", resolution)
 
     def source(self, layer: str, resolution: float = RESOLUTION) -> Any:
-        world = self.files.load(f"{{properties: {{}}, layers: [{layer}]}}")
-        return layer_grid(world.layers[0], None, resolution)
+        (self.layer,) = self.files.load(f"{{properties: {{}}, layers: [{layer}]}}").layers
+        return layer_grid(self.layer, None, resolution)
 
 
 @pytest.fixture
@@ -95,27 +95,26 @@ def points_on(edges: npt.NDArray[np.float64], spacing: float) -> npt.NDArray[np.
 
 
 class TestImages:
-    def test_values_are_those_of_map_server(self, maps: Maps) -> None:
-        grid = maps.image().load()
+    # Occupied if (255 - grey) / 255 > 0.65, free if it is < 0.196; the bottom row first.
+    @pytest.mark.parametrize(
+        ("greys", "keys", "cells"),
+        [
+            (GREYS, {}, [[-1, 0, 0], [-1, -1, -1], [100, 100, 100]]),
+            (GREYS, {"negate": "0"}, [[-1, 0, 0], [-1, -1, -1], [100, 100, 100]]),
+            (GREYS, {"free_thresh": 0.25}, [[0, 0, 0], [-1, -1, 0], [100, 100, 100]]),
+            (GREYS, {"occupied_thresh": 0.651}, [[-1, 0, 0], [-1, -1, -1], [100, 100, -1]]),
+            ([[0, 49, 50], [165, 166, 255]], {"negate": "1"}, [[-1, 100, 100], [0, 0, -1]]),
+            ([[49, 50]], {"negate": "true"}, [[0, -1]]),
+            ([[0, 100, 255]], {"mode": "raw"}, [[0, 100, -1]]),
+        ],
+    )
+    def test_values_are_those_of_map_server(
+        self, maps: Maps, greys: Any, keys: dict[str, object], cells: Any
+    ) -> None:
+        grid = maps.image(greys, **keys).load()
         assert grid.cells.dtype == np.int8
-        # Occupied if (255 - grey) / 255 > 0.65, free if it is < 0.196; the bottom row first.
-        assert grid.cells.tolist() == [[-1, 0, 0], [-1, -1, -1], [100, 100, 100]]
-
-    def test_free_thresh(self, maps: Maps) -> None:
-        grid = maps.image(free_thresh=0.25).load()
-        assert grid.cells.tolist() == [[0, 0, 0], [-1, -1, 0], [100, 100, 100]]
-
-    def test_occupied_thresh(self, maps: Maps) -> None:
-        grid = maps.image(occupied_thresh=0.651).load()
-        assert grid.cells.tolist() == [[-1, 0, 0], [-1, -1, -1], [100, 100, -1]]
-
-    @pytest.mark.parametrize("flag", ["1", "true"])
-    def test_negate(self, maps: Maps, flag: str) -> None:
-        grid = maps.image([[0, 49, 50], [165, 166, 255]], negate=flag).load()
-        assert grid.cells.tolist() == [[-1, 100, 100], [0, 0, -1]]
-
-    def test_negate_0_has_no_effect(self, maps: Maps) -> None:
-        assert maps.image(negate=0).load().cells[2].tolist() == [100, 100, 100]
+        assert grid.cells.tolist() == cells
+        assert (grid.resolution, grid.origin) == (0.5, (1.5, -2.0, 0.3))
 
     def test_mode_scale(self, maps: Maps) -> None:
         greys = [[0, 89, 90, 147, 204, 205, 206]]
@@ -123,14 +122,6 @@ class TestImages:
         ratios = [(1 - grey / 255 - 0.196) / (0.65 - 0.196) for grey in (90, 147, 204, 205)]
         expected = [100, 100, *(int(1 + 98 * ratio) for ratio in ratios), 0]
         assert grid.cells.tolist() == [expected]
-
-    def test_mode_raw(self, maps: Maps) -> None:
-        assert maps.image([[0, 100, 255]], mode="raw").load().cells.tolist() == [[0, 100, -1]]
-
-    def test_resolution_and_origin_are_those_of_the_file(self, maps: Maps) -> None:
-        grid = maps.image().load()
-        assert grid.resolution == 0.5
-        assert grid.origin == (1.5, -2.0, 0.3)
 
     def test_the_image_is_read_by_load(self, maps: Maps) -> None:
         source = maps.image()
@@ -161,20 +152,14 @@ class TestLineSegments:
     @pytest.mark.parametrize("origin", ["[0, 0, 0]", "[-7.3, 12.1, 0.7]"])
     def test_each_point_of_a_wall_is_in_an_occupied_cell(self, maps: Maps, origin: str) -> None:
         grid = maps.lines(self.LINES, origin).load()
-        (layer,) = maps.files.load(
-            "{properties: {}, layers: [{name: walls, map: map.yaml}]}"
-        ).layers
-        points = points_on(layer.world_edges, 0.001)
+        points = points_on(maps.layer.world_edges, 0.001)
         assert len(points) > 9000
         assert distance_from_occupied(grid, points).max() < 1e-3
         assert grid.origin[2] == 0.0
 
     def test_each_occupied_cell_contains_a_part_of_a_wall(self, maps: Maps) -> None:
         grid = maps.lines(self.LINES).load()
-        (layer,) = maps.files.load(
-            "{properties: {}, layers: [{name: walls, map: map.yaml}]}"
-        ).layers
-        points = np.floor(cells_of(grid, points_on(layer.world_edges, 0.0001)))
+        points = np.floor(cells_of(grid, points_on(maps.layer.world_edges, 0.0001)))
         covered = {tuple(point) for point in points.astype(int).tolist()}
         cells = {tuple(point) for point in occupied_points(grid, 0).astype(int).tolist()}
         # Cells of which a wall crosses just a corner may have no point.
@@ -237,16 +222,10 @@ class TestLineSegments:
             maps.lines("0 0 1 0")
 
 
-@pytest.mark.parametrize(
-    ("world", "layer", "pose"),
-    [("office", "walls", (-3.0, -5.5, 0.3)), ("simple", "room", (1.5, 1.5, 0.3))],
-)
-def test_the_grid_agrees_with_the_walls(
-    checkout: Path, world: str, layer: str, pose: tuple[float, float, float]
-) -> None:
-    path = checkout / "worlds" / world / "world.yaml"
-    with flatland.World.from_yaml(path, seed=1) as loaded:
-        walls = loaded.layer(layer)
+def test_the_grid_of_an_image_agrees_with_the_walls(checkout: Path) -> None:
+    pose = (-3.0, -5.5, 0.3)
+    with flatland.World.from_yaml(checkout / "worlds/office/world.yaml", seed=1) as loaded:
+        walls = loaded.layer("walls")
         grid = layer_grid(walls, None, RESOLUTION).load()
         # A point of a wall is on an occupied cell or on its border; half a cell allows for the
         # rounding of edges to single precision.
@@ -254,7 +233,7 @@ def test_the_grid_agrees_with_the_walls(
         angles = np.linspace(0, 2 * math.pi, 720, endpoint=False)
         ends = 100 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         fractions, _ = loaded.physics.cast_rays(
-            pose, ends.astype(np.float32), loaded.collision_filter.category_bits([layer])
+            pose, ends.astype(np.float32), loaded.collision_filter.category_bits(["walls"])
         )
         assert np.isfinite(fractions).all()
         hits = transform_points(pose, ends * fractions[:, np.newaxis])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -11,13 +10,6 @@ import pytest
 from flatland.physics import PhysicsBody, PhysicsWorld
 
 STEP = 0.01
-
-
-@pytest.fixture
-def world() -> Iterator[PhysicsWorld]:
-    world = PhysicsWorld()
-    yield world
-    world.close()
 
 
 def run(world: PhysicsWorld, steps: int) -> None:
@@ -71,17 +63,15 @@ def test_a_dynamic_body_without_density_has_a_mass_of_one_kilogram(world: Physic
     assert body.mass == pytest.approx(6)
 
 
-def test_a_large_map_stops_bodies_created_before_and_after_it(
-    world: PhysicsWorld,
-) -> None:
+def test_a_large_map_stops_bodies_created_before_and_after_it(world: PhysicsWorld) -> None:
     """The edges of large maps are excluded from the search for new pairs in Box2D."""
     before, resting = disc(world, -2, 0), disc(world, -0.4, 5)
     world.step(STEP, 10, 10)
     resting.awake = False
     wall = world.create_body("static", (0, 0, 0))
-    y = np.linspace(-10, 10, 20_001)
-    x = np.zeros(20_000)
-    assert wall.create_edges(np.stack([x, y[:-1], x, y[1:]], 1)) == 20_000
+    y = np.linspace(-10, 10, 10_001)
+    x = np.zeros(10_000)
+    assert wall.create_edges(np.stack([x, y[:-1], x, y[1:]], 1)) == 10_000
     after = disc(world, 2, 0)
     for body in (before, after):
         body.set_velocity(-2 * np.sign(body.pose[0]), 0, 0)
@@ -105,19 +95,6 @@ def test_velocity_is_that_of_the_origin(world: PhysicsWorld, body_type: str) -> 
     assert theta == pytest.approx(0.3 + 2e-4)
 
 
-def test_velocity_of_the_origin_of_a_free_rotating_body(
-    world: PhysicsWorld,
-) -> None:
-    body = world.create_body("dynamic", (0, 0, 0))
-    body.create_circle((1, 0), 0.5, density=1)
-    body.set_velocity(0, 0, math.pi)
-    # v_cm = omega x r = (0, pi); after half a turn the origin is on the other side of the center.
-    for _ in range(1000):
-        world.step(0.001, 10, 10)
-    assert body.pose == pytest.approx((2, math.pi, math.pi), abs=1e-3)
-    assert body.velocity == pytest.approx((0, 2 * math.pi, math.pi), abs=1e-2)
-
-
 def test_static_bodies_ignore_velocities(world: PhysicsWorld) -> None:
     body = world.create_body("static", (0, 0, 0))
     body.set_velocity(1, 1, 1)
@@ -128,20 +105,12 @@ def test_static_bodies_ignore_velocities(world: PhysicsWorld) -> None:
 
 def test_force_and_torque_act_for_one_step(world: PhysicsWorld) -> None:
     body = disc(world)
-    mass, inertia = body.mass, body.inertia
-    body.apply_force((3, 0), (0, 0))
+    body.apply_force((3, 0), (0, -0.5))
     body.apply_torque(2)
-    run(world, 1)
-    assert body.velocity == pytest.approx((3 / mass * STEP, 0, 2 / inertia * STEP), rel=1e-5)
-    run(world, 1)
-    assert body.velocity == pytest.approx((3 / mass * STEP, 0, 2 / inertia * STEP), rel=1e-5)
-
-
-def test_an_eccentric_force_turns_the_body(world: PhysicsWorld) -> None:
-    body = disc(world)
-    body.apply_force((0, 1), (0.5, 0))
-    run(world, 1)
-    assert body.velocity[2] == pytest.approx(0.5 / body.inertia * STEP, rel=1e-5)
+    for _ in range(2):
+        run(world, 1)
+        expected = (3 / body.mass * STEP, 0, (3 * 0.5 + 2) / body.inertia * STEP)
+        assert body.velocity == pytest.approx(expected, rel=1e-5)
 
 
 def test_damping_reduces_the_velocity(world: PhysicsWorld) -> None:
@@ -179,17 +148,6 @@ def test_a_moved_body_is_separated_from_bodies_at_its_new_pose(world: PhysicsWor
     mover.set_pose(10.4, 0, 0)
     run(world, 200)
     assert np.hypot(*(np.array(mover.pose) - sleeper.pose)[:2]) == pytest.approx(1, abs=0.02)
-
-
-def test_a_moved_static_body_wakes_the_bodies_at_its_new_pose(world: PhysicsWorld) -> None:
-    sleeper = disc(world, 10)
-    box = world.create_body("static", (0, 0, 0))
-    box.create_polygon([(-1, -1), (1, -1), (1, 1), (-1, 1)], density=0)
-    run(world, 100)
-    assert not sleeper.awake
-    box.set_pose(8.6, 0, 0)
-    run(world, 200)
-    assert sleeper.pose[0] > 10.05
 
 
 def test_a_moved_static_body_wakes_the_bodies_at_each_of_its_fixtures(world: PhysicsWorld) -> None:
@@ -321,7 +279,7 @@ def test_a_density_sets_the_mass(world: PhysicsWorld) -> None:
 
 def test_friction_applies_to_present_contacts(world: PhysicsWorld) -> None:
     def distance(friction: float) -> float:
-        """Returns how far a disc that is pressed on a wall slides."""
+        """Returns how far a box that is pressed on a wall slides."""
         world = PhysicsWorld()
         wall = world.create_body("static", (0, 0, 0))
         wall.create_edges(np.array([[-50, 0, 50, 0]], np.float32), friction=1.0)
@@ -337,9 +295,7 @@ def test_friction_applies_to_present_contacts(world: PhysicsWorld) -> None:
         for _ in range(20):
             box.apply_force((0, -10), box.world_center)
             world.step(STEP, 10, 10)
-        x: float = box.pose[0]
-        world.close()
-        return x
+        return float(box.pose[0])
 
     assert distance(0.0) == pytest.approx(0.2, abs=1e-3)
     assert distance(1.0) < 0.1
@@ -370,33 +326,7 @@ def test_shapes_are_scaled_about_the_origin(world: PhysicsWorld) -> None:
         wall.scale_shapes(2.0)
 
 
-def test_a_scaled_body_collides_with_its_new_shape(world: PhysicsWorld) -> None:
-    wall = world.create_body("static", (0, 0, 0))
-    wall.create_edges(np.array([[2, -5, 2, 5]], np.float32))
-    body = disc(world)
-    body.scale_shapes(2.0)
-    body.set_velocity(1, 0, 0)
-    run(world, 200)
-    assert body.pose[0] == pytest.approx(1.0, abs=0.03)
-
-
-def test_a_copy_takes_densities_frictions_and_shapes_back(world: PhysicsWorld) -> None:
-    body = disc(world)
-    saved = world.copy()
-    for _ in range(2):
-        body.fixtures[0].density, body.fixtures[0].friction = 5.0, 0.7
-        world.become_copy_of(saved)
-        fixture = body.fixtures[0]
-        assert (fixture.density, fixture.friction) == (1.0, 0.0)
-        assert body.mass == pytest.approx(math.pi / 4)
-        body.scale_shapes(3.0)
-        world.become_copy_of(saved)
-        assert body.fixtures[0].radius == 0.5
-        assert body.mass == pytest.approx(math.pi / 4)
-
-
-def test_motions_of_several_bodies_are_read_in_one_call() -> None:
-    world = PhysicsWorld()
+def test_motions_of_several_bodies_are_read_in_one_call(world: PhysicsWorld) -> None:
     bodies = [world.create_body("dynamic", (1.5 * i, -i, 0.25 * i)) for i in range(3)]
     for i, body in enumerate(bodies):
         body.create_circle((0.0, 0.0), 0.1, density=1.0)

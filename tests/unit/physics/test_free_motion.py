@@ -60,6 +60,10 @@ class Pair:
         for world in self.worlds:
             call(world)
 
+    def change(self, call: Callable[[PhysicsBody], object]) -> None:
+        for body in self.rng.choice(self.bodies):
+            call(body)
+
     def _walls(self) -> np.ndarray:
         half = SIDE / 2
         rows = [
@@ -100,28 +104,18 @@ class Pair:
         self.push()
 
     def push(self) -> None:
-        rng = self.rng
-        pair = rng.choice(self.bodies)
-        scale = rng.choice([0.0, 0.01, 1.0, 1.0, 1.0, 30.0])
-        numbers = [scale * rng.uniform(-1, 1) for _ in range(3)]
-        for body in pair:
-            body.set_velocity(*numbers)
+        scale = self.rng.choice([0.0, 0.01, 1.0, 1.0, 1.0, 30.0])
+        numbers = [scale * self.rng.uniform(-1, 1) for _ in range(3)]
+        self.change(lambda body: body.set_velocity(*numbers))
 
     def force(self) -> None:
-        rng = self.rng
-        pair = rng.choice(self.bodies)
-        if pair[0].type != "dynamic":
-            return
-        force, torque = (rng.uniform(-5, 5), rng.uniform(-5, 5)), rng.uniform(-1, 1)
-        for body in pair:
-            body.apply_force(force, body.world_center)
-            body.apply_torque(torque)
+        fx, fy, torque = (self.rng.uniform(-5, 5) for _ in range(3))
+        self.change(lambda body: body.apply_force((fx, fy), body.world_center))
+        self.change(lambda body: body.apply_torque(torque / 5))
 
     def move(self) -> None:
-        pair = self.rng.choice(self.bodies)
         pose = (*self.place(), self.rng.uniform(-9, 9))
-        for body in pair:
-            body.set_pose(*pose)
+        self.change(lambda body: body.set_pose(*pose))
 
     def join(self) -> None:
         first, second = self.rng.choice(self.bodies), self.rng.choice(self.bodies)
@@ -137,32 +131,29 @@ class Pair:
                 body.joints[0].destroy()
 
     def sense(self) -> None:
-        pair = self.rng.choice(self.bodies)
         value = self.rng.random() < 0.5
-        for body in pair:
-            body.fixtures[0].is_sensor = value
+        self.change(lambda body: setattr(body.fixtures[0], "is_sensor", value))
 
     def filter(self) -> None:
-        pair = self.rng.choice(self.bodies)
         mask = self.rng.choice([1, 2, 0xFFFF])
-        for body in pair:
-            body.fixtures[0].mask_bits = mask
+        self.change(lambda body: setattr(body.fixtures[0], "mask_bits", mask))
 
     def step(self) -> None:
         steps = (self.rng.choice([0.005, 0.005, 0.005, 0.05]), 10, self.rng.choice([10, 10, 10, 0]))
         self.both(lambda world: world.step(*steps))
 
     def check(self) -> None:
-        ours, theirs = (world.body_states().tobytes() for world in self.worlds)
-        assert ours == theirs
-        ours, theirs = (
-            [
-                (e.kind, e.contact_id, e.fixture_a, e.fixture_b, e.normal_impulses.tobytes())
-                for e in world.take_contact_events()
-            ]
-            for world in self.worlds
-        )
-        assert ours == theirs
+        states, events = [], []
+        for world in self.worlds:
+            states.append(world.body_states().tobytes())
+            events.append(
+                [
+                    (e.kind, e.contact_id, e.fixture_a, e.fixture_b, e.normal_impulses.tobytes())
+                    for e in world.take_contact_events()
+                ]
+            )
+        assert states[0] == states[1]
+        assert events[0] == events[1]
 
     @property
     def is_valid(self) -> bool:

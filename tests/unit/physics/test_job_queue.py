@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flatland.physics import AgentBatch, PhysicsBody, PhysicsWorld, RangeFinder, Run
+from flatland.physics import AgentBatch, PhysicsBody, PhysicsWorld, RangeFinder, Run, RunEnd
 from flatland.plugin_api.update_timer import UpdateTimer
 
 STEP = 10_000_000  # ns
@@ -43,11 +43,18 @@ def add_crowd(world: PhysicsWorld) -> Callable[[], None]:
     ).remove
 
 
+def test_a_run_has_new_steps_with_their_physics_by_default(world: PhysicsWorld) -> None:
+    body = world.create_body("kinematic", (0.0, 0.0, 0.0))
+    body.set_velocity(1.0, 0.0, 0.0)
+    made, end, *_ = world.jobs.run(*Run(0, STEP, 3, 0.01, 8, 3))
+    assert (made, end) == (3, RunEnd.DONE)
+    assert body.pose[0] == pytest.approx(0.03)
+
+
 @pytest.mark.parametrize("add", [add_controller, add_callback, add_crowd])
 def test_a_new_controller_acts_although_another_job_is_removed(
-    add: Callable[[PhysicsWorld], Callable[[], None]],
+    world: PhysicsWorld, add: Callable[[PhysicsWorld], Callable[[], None]]
 ) -> None:
-    world = PhysicsWorld()
     remove = add(world)
     run(world)
     body = mover(world)
@@ -56,8 +63,7 @@ def test_a_new_controller_acts_although_another_job_is_removed(
     assert body.velocity == (1.0, 0.0, 0.0)
 
 
-def test_a_new_clock_does_not_replace_one_in_use() -> None:
-    world = PhysicsWorld()
+def test_a_new_clock_does_not_replace_one_in_use(world: PhysicsWorld) -> None:
     first = world.jobs.add_callback((1, 0), ALWAYS, is_after=False)
     removed = world.jobs.add_callback((2, 0), NEVER, is_after=False)
     world.jobs.remove_callback(removed)
@@ -83,9 +89,7 @@ def _heap_use() -> int:
     return int(use.number_4 + use.number_7)  # hblkhd and uordblks
 
 
-def test_clocks_of_removed_callbacks_are_reused() -> None:
-    world = PhysicsWorld()
-
+def test_clocks_of_removed_callbacks_are_reused(world: PhysicsWorld) -> None:
     def use_new_clocks(first: int, count: int) -> None:
         for weight in range(first, first + count):
             callback = world.jobs.add_callback((1, 0), (weight, 10**6), is_after=False)
@@ -97,8 +101,7 @@ def test_clocks_of_removed_callbacks_are_reused() -> None:
     assert _heap_use() - before < 50_000  # 5 B for each clock; one that is kept takes 32 B
 
 
-def test_interrupts_never_amount_to_a_permission() -> None:
-    world = PhysicsWorld()
+def test_interrupts_never_amount_to_a_permission(world: PhysicsWorld) -> None:
     body = world.create_body("dynamic", (0, 0, 0))
     beams = RangeFinder(np.array([(1.0, 0.0)]), 1.0, origin=(0, 0, 0), mask=1)
     batch = AgentBatch([(body, body.control_velocity(), world.collect_touches([body]), beams)])

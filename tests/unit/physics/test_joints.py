@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -12,13 +11,6 @@ from flatland.errors import StaleHandleError
 from flatland.physics import PhysicsBody, PhysicsWorld
 
 STEP = 0.005
-
-
-@pytest.fixture
-def world() -> Iterator[PhysicsWorld]:
-    world = PhysicsWorld()
-    yield world
-    world.close()
 
 
 def box(world: PhysicsWorld, x: float = 0.0, body_type: str = "dynamic") -> PhysicsBody:

@@ -7,7 +7,6 @@ import gc
 import weakref
 from collections.abc import Callable
 
-import numpy as np
 import pytest
 
 from flatland.errors import StaleHandleError
@@ -86,8 +85,11 @@ def make_pair(world: PhysicsWorld) -> tuple[PhysicsBody, PhysicsBody, PhysicsFix
     return a, b, fixture, world.create_revolute_joint(a, b, (0, 0), (0, 0))
 
 
-def test_destroying_a_body_destroys_its_fixtures_and_joints() -> None:
-    world = PhysicsWorld()
+class Tracked(PhysicsWorld):
+    """A world that supports weak references."""
+
+
+def test_destroying_a_body_destroys_its_fixtures_and_joints(world: PhysicsWorld) -> None:
     a, b, fixture, joint = make_pair(world)
     a.create_edges([[0, 0, 1, 1]])
     edge = a.fixtures[1]
@@ -95,22 +97,18 @@ def test_destroying_a_body_destroys_its_fixtures_and_joints() -> None:
     assert (a.alive, b.alive) == (False, True)
     assert not any(handle.alive for handle in (fixture, edge, joint))
     assert b.joints == []
-    for use in BODY_USES:
-        with pytest.raises(StaleHandleError, match="the body was destroyed"):
-            use(a)
-    for use_fixture in FIXTURE_USES:
-        with pytest.raises(StaleHandleError, match="the fixture was destroyed"):
-            use_fixture(fixture)
-    for use_joint in JOINT_USES:
-        with pytest.raises(StaleHandleError, match="the joint was destroyed"):
-            use_joint(joint)
+    for use, handle, kind in (
+        *((use, a, "body") for use in BODY_USES),
+        *((use, fixture, "fixture") for use in FIXTURE_USES),
+        *((use, joint, "joint") for use in JOINT_USES),
+    ):
+        with pytest.raises(StaleHandleError, match=f"the {kind} was destroyed"):
+            use(handle)
     world.step(0.01, 1, 1)
     assert b.pose[0] == pytest.approx(3)
-    world.close()
 
 
-def test_all_handles_of_a_closed_world_are_stale() -> None:
-    world = PhysicsWorld()
+def test_all_handles_of_a_closed_world_are_stale(world: PhysicsWorld) -> None:
     a, b, fixture, joint = make_pair(world)
     world.close()
     world.close()
@@ -127,27 +125,18 @@ def test_all_handles_of_a_closed_world_are_stale() -> None:
             use(subject)
 
 
-def test_ids_are_not_reused() -> None:
-    world = PhysicsWorld()
-    seen = set()
-    for _ in range(1000):
+def test_ids_are_not_reused(world: PhysicsWorld) -> None:
+    seen: list[PhysicsBody | PhysicsFixture] = []
+    for _ in range(100):
         body = world.create_body("dynamic", (0, 0, 0))
-        fixture = body.create_circle((0, 0), 1, density=1)
-        assert not {body.id, fixture.id} & seen
-        seen |= {body.id, fixture.id}
+        seen += [body, body.create_circle((0, 0), 1, density=1)]
+        assert [handle.alive for handle in seen[-2:]] == [True, True]
+        assert not any(handle.alive for handle in seen[:-2])
         body.destroy()
-        assert not body.alive
-    first = world.create_body("static", (0, 0, 0))
-    first.destroy()
-    second = world.create_body("static", (0, 0, 0))
-    with pytest.raises(StaleHandleError):
-        _ = first.pose
-    assert second.alive
-    world.close()
+    assert len({handle.id for handle in seen}) == len(seen)
 
 
-def test_the_id_of_an_object_of_another_kind_is_invalid() -> None:
-    world = PhysicsWorld()
+def test_the_id_of_an_object_of_another_kind_is_invalid(world: PhysicsWorld) -> None:
     body = world.create_body("static", (0, 0, 0))
     fixture = body.create_circle((0, 0), 1, density=0)
     assert not PhysicsBody(world, fixture.id).alive
@@ -155,7 +144,6 @@ def test_the_id_of_an_object_of_another_kind_is_invalid() -> None:
     assert not PhysicsJoint(world, body.id).alive
     assert not PhysicsBody(world, 0).alive
     assert not PhysicsBody(world, 2**63 - 1).alive
-    world.close()
 
 
 def test_handles_are_compared_by_world_and_id() -> None:
@@ -169,11 +157,9 @@ def test_handles_are_compared_by_world_and_id() -> None:
     assert len({bodies[0].fixtures[0], fixture}) == 1
     assert fixture.body == bodies[0]
     assert fixture != fixture.id
-    for world in worlds:
-        world.close()
 
 
-def test_a_deep_copy_refers_to_the_copied_world_if_there_is_one() -> None:
+def test_a_deep_copy_refers_to_the_copied_world_if_there_is_one(world: PhysicsWorld) -> None:
     class Named(PhysicsBody):
         __slots__ = ("names",)
 
@@ -181,7 +167,6 @@ def test_a_deep_copy_refers_to_the_copied_world_if_there_is_one() -> None:
             super().__init__(body.world, body.id)
             self.names = names
 
-    world = PhysicsWorld()
     body = world.create_body("dynamic", (1, 2, 0))
     named = Named(body, ["hull"])
     assert copy.deepcopy(body) is copy.copy(body) is body
@@ -197,9 +182,8 @@ def test_a_deep_copy_refers_to_the_copied_world_if_there_is_one() -> None:
     assert (named.pose, twin[1].pose) == ((1, 2, 0), (5, 0, 0))
 
 
-def test_objects_of_another_world_are_refused() -> None:
-    world, other = PhysicsWorld(), PhysicsWorld()
-    stranger = other.create_body("dynamic", (0, 0, 0))
+def test_objects_of_another_world_are_refused(world: PhysicsWorld) -> None:
+    stranger = PhysicsWorld().create_body("dynamic", (0, 0, 0))
     with pytest.raises(ValueError, match="belongs to another physics world"):
         world.motions([stranger])
     with pytest.raises(TypeError, match="expected bodies"):
@@ -207,9 +191,6 @@ def test_objects_of_another_world_are_refused() -> None:
 
 
 def test_a_world_in_a_reference_cycle_is_freed() -> None:
-    class Tracked(PhysicsWorld):
-        """A world that supports weak references."""
-
     world = Tracked()
     body = world.create_body("static", (0, 0, 0))
     world.pre_solve = lambda *_, body=body: body.pose
@@ -254,40 +235,8 @@ def test_results_outlive_the_world() -> None:
 
 
 def test_a_world_without_references_is_freed() -> None:
-    class Tracked(PhysicsWorld):
-        """A world that supports weak references."""
-
     world = Tracked()
-    world.create_body("static", (0, 0, 0)).create_edges(np.random.default_rng(1).random((1000, 4)))
+    world.create_body("static", (0, 0, 0)).create_edges([[0, 0, 1, 1]])
     reference = weakref.ref(world)
     del world
     assert reference() is None, "without help of the garbage collector"
-
-
-def test_many_bodies_are_created_and_destroyed() -> None:
-    """Slots, contacts, joints and ray trees remain consistent under random operations."""
-    rng = np.random.default_rng(3)
-    world = PhysicsWorld()
-    world.record_contacts = True
-    bodies: list[PhysicsBody] = []
-    for _ in range(500):
-        if bodies and rng.random() < 0.45:
-            bodies.pop(rng.integers(len(bodies))).destroy()
-        else:
-            kind = rng.choice(["static", "kinematic", "dynamic"])
-            body = world.create_body(str(kind), (*rng.uniform(-8, 8, 2), 0))
-            body.create_circle((0, 0), 0.3, density=1)
-            if rng.random() < 0.3:
-                body.create_edges(rng.uniform(-1, 1, (5, 4)))
-            if bodies and rng.random() < 0.3:
-                other = bodies[rng.integers(len(bodies))]
-                world.create_weld_joint(body, other, (0, 0), (0, 0))
-            bodies.append(body)
-        if rng.random() < 0.2:
-            world.step(0.01, 2, 2)
-            fast, _ = world.cast_rays((0, 0, 0), rng.uniform(-9, 9, (20, 2)), 0xFFFF)
-            assert fast.shape == (20,)
-    assert all(body.alive for body in bodies)
-    ids = {body.id for body in bodies}
-    assert all({c.body_a, c.body_b} <= ids for c in world.contacts())
-    world.close()

@@ -168,11 +168,9 @@ def test_a_mirror_shows_objects_at_the_distance_of_their_image() -> None:
     target.create_circle((0, 0), 0.25, density=0)
     # The image of the target is at (5, 2).
     angle = math.atan2(2.0, 5.0)
-    scan = finder([angle, 0.0]).scan_labels(sensor, 1, 1)
-    assert scan.ranges[0] == pytest.approx(math.hypot(2.0, 5.0) - 0.25, abs=1e-5)
+    scan = finder([angle]).scan_labels(sensor, 1, 1)
+    assert scan.ranges == pytest.approx([math.hypot(2.0, 5.0) - 0.25], abs=1e-5)
     assert scan.hits[scan.labels[0] - 1][0] == target.id
-    # At normal incidence: to the mirror, back, and on to the wall behind the sensor.
-    assert scan.ranges[1] == pytest.approx(3 + 3 + 8, abs=1e-4)
 
 
 def test_a_beam_is_reflected_only_once() -> None:
@@ -211,8 +209,7 @@ def test_few_and_many_reflected_beams_have_the_same_ranges(turn: float) -> None:
     assert (few[is_reflected] == many[is_reflected]).all()
 
 
-def test_no_beam_leaves_a_room_with_mirrors_at_its_corners() -> None:
-    world = PhysicsWorld()
+def test_no_beam_leaves_a_room_with_mirrors_at_its_corners(world: PhysicsWorld) -> None:
     sensor = world.create_body("static", (0.3, -0.2, 0))
     corners = 4.0 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     for index in range(4):
@@ -299,8 +296,7 @@ def test_a_reflectance_of_minus_0_is_black() -> None:
     assert (scan.intensities == 0).all()
 
 
-def test_intensities_are_bounded_near_the_sensor_and_0_without_a_hit() -> None:
-    world = PhysicsWorld()
+def test_intensities_are_bounded_near_the_sensor_and_0_without_a_hit(world: PhysicsWorld) -> None:
     sensor = world.create_body("static", (0, 0, 0))
     add_edge(world, [0.1, -1, 0.1, 1], Material(reflectance=1.0))
     scan = finder([0.0, math.pi]).scan(sensor, 1, 1)
@@ -338,8 +334,7 @@ def test_labels_equal_those_of_single_rays(seed: int) -> None:
         assert scan.hits[label - 1] == (hit.fixture.body.id, hit.fixture.category_bits)
 
 
-def test_of_coincident_walls_the_first_one_in_the_mask_is_labelled() -> None:
-    world = PhysicsWorld()
+def test_of_coincident_walls_the_first_one_in_the_mask_is_labelled(world: PhysicsWorld) -> None:
     sensor = world.create_body("static", (0, 0, 0))
     walls = [add_edge(world, [3, -8, 3, 8], None, bits) for bits in (2, 4, 2)]
     for bits, wall in ((2, walls[0]), (4, walls[1])):
@@ -385,8 +380,7 @@ def test_a_cone_does_not_contain_the_readings_of_an_earlier_scan() -> None:
     assert cone.scan(sensor, 1, 1).ranges.min() > 7.9
 
 
-def test_an_empty_cone_has_no_hit() -> None:
-    world = PhysicsWorld()
+def test_an_empty_cone_has_no_hit(world: PhysicsWorld) -> None:
     sensor = world.create_body("static", (0, 0, 0))
     cone = finder(FRONT, is_cone=True, no_hit=math.inf).scan(sensor, 1, 1)
     assert cone.ranges.tolist() == [math.inf]

@@ -15,8 +15,7 @@ def disc(world: PhysicsWorld, x: float, y: float = 0.1, center: float = 0.0) -> 
     return body
 
 
-def test_bodies_continue_as_after_the_save() -> None:
-    world = PhysicsWorld()
+def test_bodies_continue_as_after_the_save(world: PhysicsWorld) -> None:
     # The centers, below 4 m, have one bit more than the positions from which they are computed.
     bodies = [disc(world, 4.1, float(i), center=-0.3) for i in range(12)]
     for i, body in enumerate(bodies):
@@ -36,8 +35,7 @@ def test_bodies_continue_as_after_the_save() -> None:
     assert np.array_equal(runs[0], runs[1])
 
 
-def test_sleep_and_the_time_at_rest_are_restored() -> None:
-    world = PhysicsWorld()
+def test_sleep_and_the_time_at_rest_are_restored(world: PhysicsWorld) -> None:
     body = disc(world, 0.0)
     for _ in range(30):
         world.step(*STEP)
@@ -60,8 +58,7 @@ def test_sleep_and_the_time_at_rest_are_restored() -> None:
     assert awake == [False, True]
 
 
-def test_a_wall_that_returned_is_moved_again_by_a_copy() -> None:
-    world = PhysicsWorld()
+def test_a_wall_that_returned_is_moved_again_by_a_copy(world: PhysicsWorld) -> None:
     wall = world.create_body("static", (1.0, 0.0, 0.0))
     wall.create_edges([(0.0, -1.0, 0.0, 1.0)])
     body, removed = disc(world, 1.5), disc(world, 9.0)

@@ -62,15 +62,13 @@ def gap(world: PhysicsWorld, body: PhysicsBody, pose: Pose) -> float:
         ((0.5 + math.sqrt(0.5), 0.0, math.pi / 4), 0.0),  # corner on face
     ],
 )
-def test_gap_between_squares(pose: Pose, expected: float) -> None:
-    world = PhysicsWorld()
+def test_gap_between_squares(world: PhysicsWorld, pose: Pose, expected: float) -> None:
     box(world, (0, 0, 0))
     body = box(world, (20, 20, 0))
     assert gap(world, body, pose) == pytest.approx(expected, abs=1e-5)
 
 
-def test_a_closed_loop_of_edges_has_no_interior() -> None:
-    world = PhysicsWorld()
+def test_a_closed_loop_of_edges_has_no_interior(world: PhysicsWorld) -> None:
     wall(world, (-2, -2, 2, -2), (2, -2, 2, 2), (2, 2, -2, 2), (-2, 2, -2, -2))
     body = box(world, (9, 9, 0))
     assert world.overlapping_bodies([body], (0, 0, 0)) == []
@@ -94,9 +92,8 @@ def test_a_closed_loop_of_edges_has_no_interior() -> None:
     ],
 )
 def test_only_fixtures_that_can_collide_are_considered(
-    mine: dict[str, int], other: dict[str, int], counts: bool
+    world: PhysicsWorld, mine: dict[str, int], other: dict[str, int], counts: bool
 ) -> None:
-    world = PhysicsWorld()
     disc(world, 0, 0, 1, **other)
     body = disc(world, 9, 9, 1, **mine)
     assert bool(world.overlapping_bodies([body], (0.1, 0, 0))) is counts
@@ -107,8 +104,7 @@ def test_only_fixtures_that_can_collide_are_considered(
 
 @pytest.mark.parametrize("mine", ["static", "kinematic", "dynamic"])
 @pytest.mark.parametrize("other", ["static", "kinematic", "dynamic"])
-def test_one_of_two_bodies_must_be_dynamic(mine: str, other: str) -> None:
-    world = PhysicsWorld()
+def test_one_of_two_bodies_must_be_dynamic(world: PhysicsWorld, mine: str, other: str) -> None:
     box(world, (0, 0, 0), other)
     body = box(world, (9, 9, 0), mine)
     found = world.overlapping_bodies([body], (0, 0, 0))
@@ -116,15 +112,13 @@ def test_one_of_two_bodies_must_be_dynamic(mine: str, other: str) -> None:
 
 
 @pytest.mark.parametrize("collide", [False, True])
-def test_a_joint_can_prevent_the_collision(collide: bool) -> None:
-    world = PhysicsWorld()
+def test_a_joint_can_prevent_the_collision(world: PhysicsWorld, collide: bool) -> None:
     first, second = box(world, (0, 0, 0)), box(world, (3, 0, 0))
     world.create_revolute_joint(first, second, (1.5, 0), (-1.5, 0), collide_connected=collide)
     assert bool(world.overlapping_bodies([second], (0.5, 0, 0))) is collide
 
 
-def test_bodies_of_the_probe_move_together_and_ignore_each_other() -> None:
-    world = PhysicsWorld()
+def test_bodies_of_the_probe_move_together_and_ignore_each_other(world: PhysicsWorld) -> None:
     first, second = box(world, (10, 10, math.pi / 2)), box(world, (10, 10.2, math.pi / 2))
     arm = disc(world, 10, 13, 0.5)  # 3 m in front of the first body
     target, ignored = disc(world, 0, 3, 0.5), disc(world, 0, 3.1, 0.5)
@@ -137,8 +131,7 @@ def test_bodies_of_the_probe_move_together_and_ignore_each_other() -> None:
     ).tolist() == [False, True, False]
 
 
-def test_discs_consider_their_layers_and_the_given_bodies() -> None:
-    world = PhysicsWorld()
+def test_discs_consider_their_layers_and_the_given_bodies(world: PhysicsWorld) -> None:
     walls = world.create_body("static", (0, 0, 0))
     walls.create_edges([(0, -5, 0, 5)], category_bits=1, mask_bits=1)
     stone = disc(world, 2, 0, 0.5, category_bits=2, mask_bits=2)
@@ -152,8 +145,7 @@ def test_discs_consider_their_layers_and_the_given_bodies() -> None:
     assert world.free_discs(poses, 0.3, 3, least_gap=0.25).tolist() == [False, False, False]
 
 
-def test_all_categories_are_those_of_all_fixtures() -> None:
-    world = PhysicsWorld()
+def test_all_categories_are_those_of_all_fixtures(world: PhysicsWorld) -> None:
     for bit in range(16):
         disc(world, bit, 0, 0.1, category_bits=1 << bit)
     poses = [(float(bit), 0.0, 0.0) for bit in range(17)]
@@ -277,8 +269,7 @@ def test_queries_agree_with_the_minkowski_difference(seed: int, least_gap: float
         ([(1e300, 0, 0)], r"poses\[0, 0\] must be finite and within"),
     ],
 )
-def test_invalid_poses_are_rejected(poses: object, text: str) -> None:
-    world = PhysicsWorld()
+def test_invalid_poses_are_rejected(world: PhysicsWorld, poses: object, text: str) -> None:
     body = disc(world, 0, 0, 1)
     with pytest.raises(ValueError, match=text):
         world.free_poses([body], poses)  # type: ignore[arg-type]
@@ -286,8 +277,7 @@ def test_invalid_poses_are_rejected(poses: object, text: str) -> None:
         world.free_discs(poses, 1, 1)  # type: ignore[arg-type]
 
 
-def test_invalid_numbers_and_bodies_are_rejected() -> None:
-    world = PhysicsWorld()
+def test_invalid_numbers_and_bodies_are_rejected(world: PhysicsWorld) -> None:
     body = disc(world, 0, 0, 1)
     with pytest.raises(ValueError, match="pose must be finite"):
         world.overlapping_bodies([body], (0, math.inf, 0))

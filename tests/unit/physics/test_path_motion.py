@@ -108,8 +108,7 @@ def test_places_on_a_tween(mode: str, share: float, progress: float, is_forward:
     assert body.pose == (1 + 4 * progress, 2 * progress, 0.5 * progress)
 
 
-def test_joined_bodies_are_placed_with_the_body() -> None:
-    world = PhysicsWorld()
+def test_joined_bodies_are_placed_with_the_body(world: PhysicsWorld) -> None:
     body, arm, hand = (world.create_body("dynamic", (x, 1, 0.25)) for x in (1, 3, 3))
     wall = world.create_body("static", (3, 1, 0))
     for each, other, anchor in ((body, arm, (2, 0)), (arm, hand, (0, 0)), (hand, wall, (0, 0))):

@@ -119,21 +119,18 @@ class TestReadings:
         rest = np.delete(np.arange(40), [0, 17, 39])
         np.testing.assert_array_equal(ranges[rest], expected[rest])
 
-    def test_the_pose_is_that_of_the_sensor(self) -> None:
-        world = PhysicsWorld()
+    def test_the_pose_is_that_of_the_sensor(self, world: PhysicsWorld) -> None:
         body = world.create_body("static", (1.0, 2.0, math.pi / 2))
         assert finder(fan(3)).scan(body, 0, 0).pose == pytest.approx((1.2, 2.1, math.pi / 2 + 0.3))
 
-    def test_limits(self) -> None:
-        world = PhysicsWorld()
+    def test_limits(self, world: PhysicsWorld) -> None:
         body = world.create_body("static", (0, 0, 0))
         body.create_edges([[1, -1, 1, 1], [-5, -1, -5, 1]])
         ends = [[LENGTH, 0], [-LENGTH, 0], [0, LENGTH]]
         made = finder(ends, origin=(0, 0, 0), range_min=2.0, no_hit=7.5)
         assert made.scan(body, 0, 0).ranges.tolist() == [-math.inf, 5.0, 7.5]
 
-    def test_noise_makes_ranges_negative_without_a_minimum(self) -> None:
-        world = PhysicsWorld()
+    def test_noise_makes_ranges_negative_without_a_minimum(self, world: PhysicsWorld) -> None:
         body = world.create_body("static", (0, 0, 0))
         body.create_edges([[0.1, -1, 0.1, 1]])
         ends = np.repeat([[LENGTH, 0.0]], 100, axis=0)
@@ -146,9 +143,8 @@ class TestReadings:
 
     @pytest.mark.parametrize("noise", NOISES)
     def test_intensities_are_those_of_readings_of_reflecting_fixtures(
-        self, noise: RangeNoise | None
+        self, world: PhysicsWorld, noise: RangeNoise | None
     ) -> None:
-        world = PhysicsWorld()
         body = world.create_body("static", (0, 0, 0))
         body.create_edges([[5, -9, 5, 9]], category_bits=2)
         body.create_edges([[-5, -9, -5, 9]], category_bits=1)
@@ -345,8 +341,7 @@ class TestNormalNoise:
             other = self.normal_numbers(stream, update)
             assert abs((first * other).mean()) < limit, (stream, update)
 
-    def test_numbers_of_a_beam_do_not_depend_on_other_beams(self) -> None:
-        world = PhysicsWorld()
+    def test_numbers_of_a_beam_do_not_depend_on_other_beams(self, world: PhysicsWorld) -> None:
         body = world.create_body("static", (0, 0, 0))
         body.create_edges([[EXACT, -1, EXACT, 1]])
         for noise in NOISES[1:]:

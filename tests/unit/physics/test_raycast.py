@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -12,13 +11,6 @@ import pytest
 from flatland.physics import PhysicsWorld
 
 ALL = 0xFFFF
-
-
-@pytest.fixture
-def world() -> Iterator[PhysicsWorld]:
-    world = PhysicsWorld()
-    yield world
-    world.close()
 
 
 def fan(count: int, length: float, start: float = -math.pi, stop: float = math.pi) -> npt.NDArray:
@@ -114,17 +106,6 @@ def test_sensors_stop_no_rays(world: PhysicsWorld) -> None:
     assert np.isnan(world.cast_rays((0, 0, 0), [[10, 0]], 1)[0][0])
 
 
-def test_a_ray_does_not_hit_the_shape_in_which_it_starts(world: PhysicsWorld) -> None:
-    body = world.create_body("dynamic", (0, 0, 0))
-    body.create_circle((0, 0), 1, density=1)
-    body.create_polygon([(-2, -2), (2, -2), (2, 2), (-2, 2)], density=1)
-    world.create_body("static", (0, 0, 0)).create_circle((5, 0), 0.5, density=0)
-    fractions, _ = world.cast_rays((0.5, 0.1, 0), [[9, 0], [-9, 0]], ALL)
-    np.testing.assert_allclose(fractions * 9, [4.01, np.nan], atol=0.01)
-    # Both are hit from outside.
-    assert world.cast_rays((-6, 0, 0), [[10, 0]], ALL)[0][0] == pytest.approx(0.4)
-
-
 def test_rays_hit_the_end_points_of_edges(world: PhysicsWorld) -> None:
     """This holds for edges of both directions, from both sides."""
     wall = world.create_body("static", (0, 0, 0))
@@ -148,68 +129,18 @@ def test_a_scan_from_an_edge_hits_only_the_edge(world: PhysicsWorld, edge: list[
     assert (fractions[~along] == 0).all()
 
 
-def test_scans_hit_moved_bodies(world: PhysicsWorld) -> None:
-    """Walls and robots, moved by set_pose and by steps."""
-    wall = world.create_body("static", (5, 0, 0))
-    wall.create_edges([[0, -1, 0, 1]])
+def test_scans_hit_bodies_that_steps_have_moved(world: PhysicsWorld) -> None:
     ball = world.create_body("dynamic", (9, 0, 0))
     ball.create_circle((0, 0), 0.5, density=1)
+    ball.set_velocity(-2, 0, 0)
     door = world.create_body("kinematic", (0, 20, 0))
     door.create_edges([[-1, 0, 1, 0]])
-
-    def ranges() -> list[float]:
-        fractions, _ = world.cast_rays((0, 0, 0), [[20, 0], [0, 20], [-20, 0]], ALL)
-        return (20 * fractions.astype(float)).tolist()
-
-    assert ranges()[:2] == pytest.approx([5, 20])
-    wall.set_pose(7, 0, 0)
-    assert ranges()[0] == pytest.approx(7)
-    wall.set_pose(0, 4, math.pi / 2)
-    assert ranges()[:2] == pytest.approx([8.5, 4])
-    wall.set_pose(0, -50, 0)
-    ball.set_velocity(-2, 0, 0)
     door.set_velocity(0, -3, 0)
-    for _ in range(100):
-        world.step(0.01, 5, 5)
-    assert ranges()[:2] == pytest.approx([6.5, 17], abs=1e-4)
-    ball.set_pose(-3, 0, 0)
-    assert ranges()[2] == pytest.approx(2.5)
-
-
-def test_scans_reflect_created_and_destroyed_bodies(world: PhysicsWorld) -> None:
-    def range_ahead() -> float:
-        return float(world.cast_rays((0, 0, 0), [[20, 0]], ALL)[0][0] * 20)
-
-    far = world.create_body("static", (0, 0, 0))
-    far.create_edges([[9, -1, 9, 1]])
-    assert range_ahead() == pytest.approx(9)
-    near = world.create_body("static", (0, 0, 0))
-    near.create_edges([[4, -1, 4, 1]])
-    assert range_ahead() == pytest.approx(4)
-    far.create_edges([[2, -1, 2, 1]])
-    assert range_ahead() == pytest.approx(2)
-    far.destroy()
-    assert range_ahead() == pytest.approx(4)
-    ball = world.create_body("dynamic", (2, 0, 0))
-    ball.create_circle((0, 0), 0.5, density=1)
-    assert range_ahead() == pytest.approx(1.5)
-    ball.destroy()
-    near.destroy()
-    assert math.isnan(range_ahead())
-
-
-def test_only_the_nearest_hit_reflects(world: PhysicsWorld) -> None:
-    wall = world.create_body("static", (0, 0, 0))
-    wall.create_edges([[5, -1, 5, 1]], category_bits=1)
-    wall.create_edges([[9, -1, 9, 1], [-5, -1, -5, 1], [0, 5, 1, 5]], category_bits=2)
-    wall.create_edges([[-9, -1, -9, 1]], category_bits=1)
-    ends = [[20, 0], [-20, 0], [0.5, 20], [0, -20]]
-    fractions, reflect = world.cast_rays((0, 0, 0), ends, 3, 2)
-    np.testing.assert_allclose(fractions[:2] * 20, [5, 5], rtol=1e-6)
-    assert reflect.tolist() == [False, True, True, False]
-    # Fixtures without a category in the mask do not reflect.
-    assert world.cast_rays((0, 0, 0), ends, 1, 2)[1].tolist() == [False] * 4
-    assert world.cast_rays((0, 0, 0), ends, 3, 0)[1].tolist() == [False] * 4
+    for expected in ([8.5, 20], [6.5, 17]):
+        fractions, _ = world.cast_rays((0, 0, 0), [[20, 0], [0, 20]], ALL)
+        assert 20 * fractions == pytest.approx(expected, abs=1e-4)
+        for _ in range(100):
+            world.step(0.01, 5, 5)
 
 
 def test_any_of_several_fixtures_at_the_same_distance_reflects(world: PhysicsWorld) -> None:
@@ -242,7 +173,7 @@ def test_a_hit_near_the_end_of_a_ray_does_not_reflect(world: PhysicsWorld) -> No
     np.testing.assert_array_equal(reflect, reference[1])
 
 
-@pytest.mark.parametrize("angle", [0.1 * k for k in range(1, 63)])
+@pytest.mark.parametrize("angle", np.arange(0.1, 6.3, 0.3))
 def test_a_ray_along_the_line_of_a_wall_has_no_hit_beside_the_wall(
     world: PhysicsWorld, angle: float
 ) -> None:
@@ -261,17 +192,14 @@ def test_a_ray_along_the_line_of_a_wall_has_no_hit_beside_the_wall(
     assert np.all(np.isnan(ahead) | (ahead * 200 >= near * (1 - 1e-5)))
 
 
-def test_one_of_several_layers_is_moved_changed_and_destroyed(
-    world: PhysicsWorld,
-) -> None:
-    wall = [[1, -1, 1, 1]]
-    bodies = [world.create_body("static", (0, 0, 0)) for _ in range(3)]
-    for body in bodies:
-        body.create_edges(wall)
-
+def test_one_of_several_layers_is_moved_changed_and_destroyed(world: PhysicsWorld) -> None:
     def distance(mask: int = ALL) -> float:
         return float(world.cast_rays((0, 0, 0), [[10, 0]], mask)[0][0] * 10)
 
+    assert math.isnan(distance())
+    bodies = [world.create_body("static", (0, 0, 0)) for _ in range(3)]
+    for body in bodies:
+        body.create_edges([[1, -1, 1, 1]])
     assert distance() == pytest.approx(1)
     bodies[1].set_pose(-0.5, 0, 0)
     assert distance() == pytest.approx(0.5)
@@ -284,9 +212,9 @@ def test_one_of_several_layers_is_moved_changed_and_destroyed(
     bodies[2].fixtures[0].category_bits = 8
     assert distance(mask=8) == pytest.approx(1)
     bodies[1].destroy()
-    assert distance(mask=1) != distance(mask=1), "NaN"
+    assert math.isnan(distance(mask=1))
     bodies[2].destroy()
-    assert distance() != distance(), "NaN"
+    assert math.isnan(distance())
 
 
 def test_scans_are_correct_with_more_fans_than_are_cached(world: PhysicsWorld) -> None:

@@ -240,7 +240,6 @@ def test_scans_equal_those_of_box2d(data: st.DataObject) -> None:
             assert is_valid(
                 world, mask, reflect_mask, pose, ends[ray], got[ray], reflect[ray], margin
             ), f"ray {ray} from {pose}: range {got[ray]} m, reflection {reflect[ray]}"
-    world.close()
 
 
 def is_valid(
@@ -337,4 +336,3 @@ def test_no_ray_leaves_a_closed_outline(
     ends *= (2 * length / np.hypot(*ends.T))[:, None]
     fractions, _ = world.cast_rays((x, y, theta), ends, 0xFFFF)
     assert not np.isnan(fractions).any()
-    world.close()

@@ -130,10 +130,6 @@ class TestScans:
         assert laser.scan.pose[:2] == pytest.approx((4, 3))
         assert eye(world).last_scan is None
 
-    def test_scans_are_optional(self, files):
-        world = room_world(files, f"[{laser_yaml()}]")
-        assert describe_world(world, None, scans=False).lasers == []
-
     def test_mounting_pose_and_upside_down(self, files):
         world = room_world(files, f"[{laser_yaml('upside_down: true, origin: [1, 0, 0]')}]")
         expected = [(4, 9), (9, 4), (4, 1), (1, 4)]
@@ -182,14 +178,6 @@ class TestScans:
         assert distance_from_walls(laser.ends()).max() < 1e-4
         # Within 45 ms the robot has driven 45 mm.
         assert math.dist(position, world.models[0].pose[:2]) == pytest.approx(0.045, abs=5e-3)
-
-    def test_last_scan_stays_where_it_was_taken_when_the_model_is_moved(self, files):
-        world = room_world(files, f"[{laser_yaml('update_rate: 1', increment=0.01)}]")
-        world.output("/scan")
-        world.step()
-        before = hits(world)
-        world.move_model("robot", (7, 6, 0.3))
-        assert (hits(world) == before).all()
 
     def test_lasers_with_the_same_topic_and_frame_are_drawn_separately(self, files):
         other = laser_yaml("origin: [0, 0, 0.5], frame: eye").replace("name: eye", "name: other")
