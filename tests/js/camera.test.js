@@ -11,16 +11,10 @@ function assertClose(found, expected) {
   for (const [i, value] of found.entries()) assert.ok(Math.abs(value - expected[i]) < 1e-9, `${found}`);
 }
 
-test("the centre of the view is the position of the camera", () => {
+test("the view is around the camera, and a positive angle turns the world counter-clockwise", () => {
   assertClose(camera().toScreen(3, -2), [320, 240]);
   assertClose(camera({ angle: 0 }).toScreen(4, -1), [370, 190]);
-});
-
-test("a positive angle turns the world counter-clockwise", () => {
   assertClose(camera({ angle: Math.PI / 2 }).toScreen(4, -2), [320, 190]);
-});
-
-test("toWorld is the inverse of toScreen", () => {
   assertClose(camera().toWorld(...camera().toScreen(1.25, 8)), [1.25, 8]);
 });
 
@@ -52,13 +46,8 @@ test("fit shows an area, also in a turned view", () => {
     const fitted = camera({ angle });
     fitted.fit([-1, -2, 9, 4]);
     assertClose([fitted.x, fitted.y], [4, 1]);
-    for (const [x, y] of [
-      [-1, -2],
-      [9, 4],
-      [-1, 4],
-      [9, -2],
-    ]) {
-      const [px, py] = fitted.toScreen(x, y);
+    const corners = [-1, 9].flatMap((x) => [-2, 4].map((y) => fitted.toScreen(x, y)));
+    for (const [px, py] of corners) {
       assert.ok(px >= 0 && px <= 640 && py >= 0 && py <= 480, `${angle}: ${px}, ${py}`);
     }
   }

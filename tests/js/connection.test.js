@@ -168,22 +168,15 @@ test("a connection whose end the browser has not reported yet is lost when anoth
 
 test("a probe reconnects if there is neither a reply nor a message", async (t) => {
   t.mock.timers.enable({ apis: ["setTimeout"] });
-  const { connection, socket } = connect();
-  connection.probe("look", {});
-  assert.equal(socket.sent[0].type, "look");
-  t.mock.timers.tick(4000);
-  await settle();
-  assert.equal(connection.state, "reconnecting");
-});
-
-test("a probe keeps a connection that receives messages", async (t) => {
-  t.mock.timers.enable({ apis: ["setTimeout"] });
-  const { connection, socket } = connect();
-  connection.probe("look", {});
-  socket.onmessage({ data: '{"type":"gone","world":0}' });
-  t.mock.timers.tick(4000);
-  await settle();
-  assert.equal(connection.state, "connected");
+  for (const state of ["connected", "reconnecting"]) {
+    const { connection, socket } = connect();
+    connection.probe("look", {});
+    assert.equal(socket.sent[0].type, "look");
+    if (state === "connected") socket.onmessage({ data: '{"type":"gone","world":0}' });
+    t.mock.timers.tick(4000);
+    await settle();
+    assert.equal(connection.state, state);
+  }
 });
 
 test("a probe opens a closed connection", () => {

@@ -4,18 +4,16 @@ import { Editing, nameOfCopy, namespaceOfCopy } from "../../flatland/web/page/js
 import { createNotices } from "../../flatland/web/page/js/panels/notices.js";
 import { saveWorld } from "../../flatland/web/page/js/panels/save_world.js";
 import { redo, undo } from "../../flatland/web/page/js/undo.js";
-import { openPage, settle } from "./fake_page.js";
-import { CRATE, describeModel, models, showRoom } from "./fake_server.js";
+import { settle } from "./fake_page.js";
+import { CRATE, describeModel, models, openRoom } from "./fake_server.js";
 
 function open(options) {
-  const elements = openPage();
-  const { connection, session, world } = showRoom(options);
-  createNotices(session);
-  const editing = new Editing(session, () => ({ x: 3, y: 4 }));
-  const texts = () => elements.notices.querySelectorAll("p").map((each) => each.textContent);
+  const room = openRoom(options);
+  createNotices(room.session);
+  const editing = new Editing(room.session, () => ({ x: 3, y: 4 }));
   const undoButton = () =>
-    elements.notices.querySelectorAll("button").find((each) => each.textContent === "Undo") ?? null;
-  return { elements, connection, session, world, editing, texts, undoButton };
+    room.elements.notices.querySelectorAll("button").find((each) => each.textContent === "Undo") ?? null;
+  return { ...room, editing, undoButton };
 }
 
 test("a copy has the lowest free number, and a namespace beside that of the model", () => {
@@ -30,16 +28,16 @@ test("a copy has the lowest free number, and a namespace beside that of the mode
 });
 
 test("a deleted model can be undone in the notice", async () => {
-  const { connection, session, editing, texts, undoButton } = open();
+  const { connection, session, editing, notices, undoButton } = open();
   connection.replies = { delete: { can_undo: true }, undo: { text: 'the deletion of "crate"', effect: "" } };
   session.select("crate");
   assert.ok(await editing.deleteSelected());
   assert.deepEqual(connection.take("delete"), [{ world: 0, model: CRATE }]);
-  assert.deepEqual([texts(), session.selectedName], [["Deleted crate"], null]);
+  assert.deepEqual([notices.splice(0), session.selectedName], [["Deleted crate"], null]);
   undoButton().click();
   await settle();
   assert.deepEqual(connection.take("undo"), [{ world: 0 }]);
-  assert.deepEqual(texts(), ['Undone: the deletion of "crate"']);
+  assert.deepEqual(notices, ['Undone: the deletion of "crate"']);
 });
 
 test("a notice has no button for what cannot be undone, or is not the last edit", async () => {
@@ -56,7 +54,7 @@ test("a notice has no button for what cannot be undone, or is not the last edit"
 });
 
 test("copies are pasted at the pointer with names of their own", async () => {
-  const { connection, session, world, editing, texts } = open();
+  const { connection, session, world, editing, notices } = open();
   const crate = describeModel(CRATE, "crate", { namespace: "depot/crate", file: "/w/crate.yaml" });
   connection.emit("message", models([crate], { complete: false }));
   await editing.paste();
@@ -70,7 +68,7 @@ test("copies are pasted at the pointer with names of their own", async () => {
     { ...shared, name: "crate_2", pose: [3, 4, 0], namespace: "depot/crate_2" },
     { ...shared, name: "crate_3", pose: [1, 2, 0], namespace: "depot/crate_3" },
   ]);
-  assert.ok(texts().includes("Pasted crate_3; its topics begin with /depot/crate_3/"));
+  assert.ok(notices.includes("Pasted crate_3; its topics begin with /depot/crate_3/"));
   // Once the server has listed and removed a copy, its name is free again.
   connection.emit("message", models([describeModel(8, "crate_2")], { complete: false }));
   connection.emit("message", models([], { complete: false, removed: [8] }));
@@ -79,50 +77,42 @@ test("copies are pasted at the pointer with names of their own", async () => {
   await editing.paste();
   connection.replies.spawn = undefined;
   await editing.paste();
-  assert.deepEqual(
-    connection.take("spawn").map(({ name }) => name),
-    ["crate_2", "crate_2"],
-  );
+  const names = connection.take("spawn").map(({ name }) => name);
+  assert.deepEqual(names, ["crate_2", "crate_2"]);
 });
 
 test("a model without a file is not copied", () => {
-  const { connection, session, editing, texts } = open();
+  const { connection, session, editing, notices } = open();
   connection.emit("message", models([describeModel(CRATE, "crate", { file: null })], { complete: false }));
   session.select("crate");
   editing.copy();
   assert.equal(editing.copied, null);
-  assert.match(texts()[0], /cannot be copied/);
+  assert.match(notices[0], /cannot be copied/);
 });
 
 test("the effect of a time that is set back is shown", async () => {
-  const { connection, session, editing, texts } = open();
-  connection.replies = {
-    reset: { can_undo: true, effect: "/clock is set back" },
-    redo: { text: "the reset", effect: "" },
-  };
+  const { connection, session, editing, notices } = open();
+  const reset = { can_undo: true, effect: "/clock is set back" };
+  connection.replies = { reset, redo: { text: "the reset", effect: "" } };
   await editing.reset();
-  assert.ok(texts().includes("/clock is set back"));
+  assert.ok(notices.includes("/clock is set back"));
   await redo(session);
-  assert.ok(texts().includes("Redone: the reset"));
+  assert.ok(notices.includes("Redone: the reset"));
 });
 
 test("a saved world is a file, with notes on what is missing", async (t) => {
-  const { connection, session, texts } = open();
+  const { connection, session, notices } = open();
   const saved = [];
   t.mock.method(URL, "createObjectURL", (blob) => {
     saved.push(blob);
     return "blob:1";
   });
   t.mock.timers.enable({ apis: ["setTimeout"] });
-  connection.replies.save = {
-    text: "models: []\n",
-    name: "w_saved.yaml",
-    folder: "/w",
-    notes: ["no people"],
-  };
+  const file = { text: "models: []\n", name: "w_saved.yaml", folder: "/w" };
+  connection.replies.save = { ...file, notes: ["no people"] };
   await saveWorld(session);
   assert.equal(await saved[0].text(), "models: []\n");
-  assert.deepEqual(texts(), ["World saved as w_saved.yaml; put the file into /w", "no people"]);
+  assert.deepEqual(notices, ["World saved as w_saved.yaml; put the file into /w", "no people"]);
 });
 
 test("a read-only page changes nothing", async () => {

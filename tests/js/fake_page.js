@@ -207,9 +207,8 @@ class FakeContext {
   constructor() {
     this.texts = [];
     this.points = [];
-    for (const name of ["scale", "save", "restore", "beginPath", "closePath", "rect", "clip"])
-      this[name] = () => {};
-    for (const name of ["moveTo", "stroke", "fill"]) this[name] = () => {};
+    const others = "scale save restore beginPath closePath rect clip moveTo stroke fill";
+    for (const name of others.split(" ")) this[name] = () => {};
   }
 
   fillText(text) {
@@ -318,15 +317,10 @@ export function openPage({ hash = "", search = "" } = {}) {
   for (const name of ["setTimeout", "clearTimeout", "setInterval", "clearInterval"]) {
     fakeWindow[name] = (...values) => globalThis[name](...values);
   }
-  const kinds = [
-    "Node",
-    "Element",
-    "HTMLElement",
-    "HTMLInputElement",
-    "HTMLSelectElement",
-    "HTMLCanvasElement",
-  ];
-  for (const kind of [...kinds, "HTMLButtonElement", "HTMLDialogElement"]) globalThis[kind] = FakeElement;
+  for (const kind of ["", "Input", "Select", "Canvas", "Button", "Dialog"]) {
+    globalThis[`HTML${kind}Element`] = FakeElement;
+  }
+  globalThis.Node = globalThis.Element = FakeElement;
   globalThis.PointerEvent = Event;
   globalThis.WheelEvent = { DOM_DELTA_LINE: 1 };
   globalThis.ResizeObserver = class {

@@ -3,6 +3,7 @@
 import { Emitter } from "../../flatland/web/page/js/events.js";
 import { Session } from "../../flatland/web/page/js/session.js";
 import { Stage } from "../../flatland/web/page/js/stage.js";
+import { openPage } from "./fake_page.js";
 
 /** Records requests; a request fails if `replies` has an error for its type. */
 export class FakeConnection extends Emitter {
@@ -59,6 +60,12 @@ export function worldMessage(world, fields = {}) {
   return { type: "world", world, ...rest, ...fields };
 }
 
+/** Returns the first message of a connection; `worlds` are numbers. */
+export function hello(worlds, fields = {}) {
+  const names = worlds.map((world) => ({ world, name: `room ${world}` }));
+  return { type: "hello", title: "flatland", read_only: false, worlds: names, ...fields };
+}
+
 export function status(fields = {}) {
   const rest = { time: 1, paused: false, rate: 200, real_time_factor: 1, stale: 0 };
   return { type: "status", world: 0, ...rest, ...fields };
@@ -79,28 +86,36 @@ export function poses(byId, { world = 0, time = 1 } = {}) {
 export const ROBOT = 1;
 export const CRATE = 2;
 
-/** Returns a session that shows a room: a robot at (-2, 1), a crate of 1 m at (2, -2). */
+/**
+ * Returns a session that shows a room: a robot at (-2, 1), a crate of 1 m at (2, -2).
+ *
+ * The result contains the texts of all notices.
+ */
 export function showRoom({ readOnly = false, worlds = 1 } = {}) {
   const connection = new FakeConnection();
   const session = new Session(connection);
-  const names = Array.from({ length: worlds }, (_, world) => ({ world, name: `room ${world}` }));
-  connection.emit("message", { type: "hello", title: "flatland", read_only: readOnly, worlds: names });
-  for (const { world } of names) {
+  const notices = [];
+  session.on("notice", ({ text }) => notices.push(text));
+  const numbers = Array.from({ length: worlds }, (_, world) => world);
+  connection.emit("message", hello(numbers, { read_only: readOnly }));
+  for (const world of numbers) {
     connection.emit("message", worldMessage(world));
-    connection.emit("data", {
-      kind: "edges",
-      world,
-      time: 0,
-      layer: 0,
-      edges: new Float32Array([-5, -5, 5, 5]),
-    });
+    const edges = new Float32Array([-5, -5, 5, 5]);
+    connection.emit("data", { kind: "edges", world, time: 0, layer: 0, edges });
     const robot = describeModel(ROBOT, "robot", { commands: ["/cmd_vel"] });
     const crate = describeModel(CRATE, "crate", { body: { shapes: [{ kind: "polygon", points: SQUARE }] } });
     connection.emit("message", models([robot, crate], { world }));
     connection.emit("data", poses({ 10: [-2, 1, 0], 20: [2, -2, 0] }, { world }));
     connection.emit("message", status({ world }));
   }
-  return { connection, session, world: session.world };
+  return { connection, session, notices, world: session.world };
+}
+
+/** Opens the page anew, and shows a room on its stage; returns all of its parts. */
+export function openRoom({ hash = "", search = "", ...options } = {}) {
+  const elements = openPage({ hash, search });
+  const shown = showRoom(options);
+  return { elements, stage: createStage(shown.session), ...shown };
 }
 
 /** Returns a stage of 200 by 100 pixels that shows 20 pixels per metre around the origin. */

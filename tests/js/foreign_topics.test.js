@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { deflateSync } from "node:zlib";
 import { eventually, settle } from "./fake_page.js";
-import { showRoom } from "./fake_server.js";
+import { hello, showRoom } from "./fake_server.js";
 
 const PATH = { id: 1, topic: "/plan", type: "nav_msgs/Path", drawn_as: "marks", status: "" };
 const GRID = { id: 2, topic: "/costmap", type: "nav_msgs/OccupancyGrid", drawn_as: "grid", status: "" };
@@ -13,10 +13,9 @@ const POSE_TOPICS = {
 
 function open() {
   const shown = showRoom();
-  const list = (topics = [PATH, GRID]) =>
-    shown.connection.emit("message", { type: "topics", world: 0, topics, pose_topics: POSE_TOPICS });
-  list();
-  return { ...shown, topics: shown.session.topics, list };
+  const topics = { type: "topics", world: 0, topics: [PATH, GRID], pose_topics: POSE_TOPICS };
+  shown.connection.emit("message", topics);
+  return { ...shown, topics: shown.session.topics };
 }
 
 function marks(topic) {
@@ -27,17 +26,8 @@ function marks(topic) {
 
 function grid(cells, size = cells.length) {
   const compressed = new Uint8Array(deflateSync(new Uint8Array(cells)));
-  return {
-    kind: "grid",
-    world: 0,
-    time: 1,
-    topic: 2,
-    width: size,
-    height: 1,
-    pose: [0, 0, 0],
-    resolution: 1,
-    compressed,
-  };
+  const place = { pose: [0, 0, 0], resolution: 1, width: size, height: 1 };
+  return { kind: "grid", world: 0, time: 1, topic: 2, ...place, compressed };
 }
 
 test("selected topics are requested", async () => {
@@ -95,12 +85,7 @@ test("a new connection keeps the selection and discards the drawings", () => {
   topics.show("/plan", true);
   connection.emit("data", marks(1));
   connection.emit("state", "reconnecting");
-  connection.emit("message", {
-    type: "hello",
-    title: "",
-    read_only: false,
-    worlds: [{ world: 0, name: "" }],
-  });
+  connection.emit("message", hello([0]));
   assert.equal(topics.entries, null);
   assert.equal(topics.marks.size, 0);
   assert.deepEqual(session.demands().topics, ["/plan"]);

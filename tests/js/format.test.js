@@ -6,21 +6,13 @@ test("numbers have fixed decimals, a minus sign and no negative zero", () => {
   assert.equal(fixed(1.005, 1), "1.0");
   assert.equal(fixed(-1.25), "−1.25");
   assert.equal(fixed(-0.001), "0.00");
-  assert.deepEqual(
-    [null, undefined, NaN].map((value) => fixed(value)),
-    ["–", "–", "–"],
-  );
-  assert.deepEqual(
-    [Infinity, -Infinity].map((value) => fixed(value)),
-    ["∞", "−∞"],
-  );
+  const special = [null, undefined, NaN, Infinity, -Infinity].map((value) => fixed(value));
+  assert.deepEqual(special, ["–", "–", "–", "∞", "−∞"]);
 });
 
 test("numbers have significant digits", () => {
-  assert.deepEqual(
-    [1234.56, -0.00012345, 2].map((value) => significant(value, 3)),
-    ["1230", "−0.000123", "2"],
-  );
+  const texts = [1234.56, -0.00012345, 2].map((value) => significant(value, 3));
+  assert.deepEqual(texts, ["1230", "−0.000123", "2"]);
   assert.equal(significant(-Infinity), "−∞");
 });
 
@@ -52,14 +44,8 @@ test("lists are short", () => {
   const many = Array.from({ length: 20 }, (_, i) => i);
   assert.equal(brief(many), "20 values: 0, 1, 2, …");
   assert.equal(brief([...many.slice(0, 16), "… 311 items"]), "311 values: 0, 1, 2, …");
-  assert.equal(
-    brief([
-      [1, 2],
-      [3, 4],
-      [5, 6],
-    ]),
-    "3 × 2 values",
-  );
+  const row = [1, 2];
+  assert.equal(brief([row, row, row]), "3 × 2 values");
 });
 
 test("objects and texts are limited", () => {

@@ -18,14 +18,9 @@ function assertClose(found, expected) {
 }
 
 test("angles are wrapped to (-pi, pi]", () => {
-  assertClose([3 * Math.PI, -3 * Math.PI, -Math.PI, 7, -7, 0].map(wrapAngle), [
-    Math.PI,
-    Math.PI,
-    Math.PI,
-    7 - 2 * Math.PI,
-    2 * Math.PI - 7,
-    0,
-  ]);
+  const { PI } = Math;
+  const wrapped = [3 * PI, -3 * PI, -PI, 7, -7, 0].map(wrapAngle);
+  assertClose(wrapped, [PI, PI, PI, 7 - 2 * PI, 2 * PI - 7, 0]);
 });
 
 test("points are transformed from a frame to its parent and back", () => {

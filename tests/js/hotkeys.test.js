@@ -7,28 +7,17 @@ import { PanTool } from "../../flatland/web/page/js/tools/pan_tool.js";
 import { SelectTool } from "../../flatland/web/page/js/tools/select_tool.js";
 import { SpawnTool } from "../../flatland/web/page/js/tools/spawn_tool.js";
 import { ToolBox } from "../../flatland/web/page/js/tools/tool_box.js";
-import { dispatch, openPage } from "./fake_page.js";
-import { createStage, showRoom } from "./fake_server.js";
+import { dispatch } from "./fake_page.js";
+import { openRoom } from "./fake_server.js";
 
-const ACTIONS = [
-  "togglePause",
-  "step",
-  "openSpawn",
-  "deleteSelected",
-  "copy",
-  "paste",
-  "undo",
-  "redo",
-  "toggleFollow",
-  "togglePlots",
-  "showAll",
-  "openHelp",
-];
+/** Actions without modifiers, in the order of their keys in `KEYS`. */
+const NAMES = "togglePause step openSpawn deleteSelected toggleFollow togglePlots showAll openHelp";
+const ACTIONS = NAMES.split(" ");
+const KEYS = [" ", ".", "n", "Delete", "T", "p", "g", "?"];
+const TOPICS = { type: "topics", world: 0, topics: [], pose_topics: {} };
 
 function open(options) {
-  const elements = openPage();
-  const { connection, session } = showRoom(options);
-  const stage = createStage(session);
+  const { elements, session, stage } = openRoom(options);
   const tools = new ToolBox({
     select: new SelectTool(session, stage),
     pan: new PanTool(),
@@ -39,34 +28,26 @@ function open(options) {
   });
   const drive = new Drive(session);
   const calls = [];
-  const actions = Object.fromEntries(ACTIONS.map((name) => [name, () => calls.push(name)]));
+  const names = [...ACTIONS, "copy", "paste", "undo", "redo"];
+  const actions = Object.fromEntries(names.map((name) => [name, () => calls.push(name)]));
   const hotkeys = new Hotkeys(stage, session, tools, drive, actions);
-  return { elements, connection, session, stage, tools, drive, calls, hotkeys };
+  /** Returns the keys that the help lists. */
+  const helpKeys = () => {
+    hotkeys.createHelp();
+    return elements["help-content"].querySelectorAll("kbd").map((key) => key.textContent);
+  };
+  return { elements, session, stage, tools, drive, calls, hotkeys, helpKeys };
 }
 
 /** Presses a key; the event is at an element of the page. */
 function press(key, fields = {}, target = document.body) {
-  const event = new Event("keydown", { cancelable: true });
-  for (const [name, value] of Object.entries({ key, code: "", target, ...fields })) {
-    Object.defineProperty(event, name, { value });
-  }
-  document.dispatchEvent(event);
-  return event.defaultPrevented;
+  return dispatch(document, "keydown", { key, code: "", target, ...fields }).defaultPrevented;
 }
 
 test("keys run their actions", () => {
   const { calls, tools } = open();
-  for (const key of [" ", ".", "n", "Delete", "T", "p", "g", "?"]) assert.ok(press(key), key);
-  assert.deepEqual(calls, [
-    "togglePause",
-    "step",
-    "openSpawn",
-    "deleteSelected",
-    "toggleFollow",
-    "togglePlots",
-    "showAll",
-    "openHelp",
-  ]);
+  for (const key of KEYS) assert.ok(press(key), key);
+  assert.deepEqual(calls, ACTIONS);
   press("m");
   assert.equal(tools.name, "measure");
   press("Escape");
@@ -75,27 +56,24 @@ test("keys run their actions", () => {
 });
 
 test("keys of tools that publish poses require topics of other programs", () => {
-  const { session, elements, hotkeys, tools } = open();
+  const { session, helpKeys, tools } = open();
   assert.ok(!press("o"));
-  hotkeys.createHelp();
-  assert.ok(!elements["help-content"].textContent.includes("Publish a goal"));
-  session.topics.receiveList({ topics: [], pose_topics: { goal: [], initial_pose: [] } });
-  hotkeys.createHelp();
-  assert.ok(elements["help-content"].textContent.includes("Publish a goal"));
-  for (const [key, name] of [
-    ["o", "goal"],
-    ["i", "initial_pose"],
-  ]) {
+  assert.ok(!helpKeys().includes("O"));
+  session.topics.receiveList(TOPICS);
+  assert.ok(helpKeys().includes("O") && helpKeys().includes("I"));
+  for (const [key, name] of Object.entries({ o: "goal", i: "initial_pose" })) {
     assert.ok(press(key));
     assert.equal(tools.name, name);
   }
 });
 
 test("a read-only page has no keys that change the world", () => {
-  const { calls } = open({ readOnly: true });
+  const { calls, session, helpKeys } = open({ readOnly: true });
   for (const key of [" ", ".", "n", "Delete"]) assert.ok(!press(key), key);
   press("p");
   assert.deepEqual(calls, ["togglePlots"]);
+  session.topics.receiveList(TOPICS);
+  for (const key of ["O", "I", "N", "Ctrl+Z", "Ctrl+V"]) assert.ok(!helpKeys().includes(key), key);
 });
 
 test("Ctrl and Cmd copy, paste, undo and redo; selected text is copied by the browser", () => {
@@ -116,7 +94,7 @@ test("Ctrl and Cmd copy, paste, undo and redo; selected text is copied by the br
 
 test("typed text, shortcuts of the browser and dialogs have no effect", () => {
   const { calls, elements, session, tools } = open();
-  session.topics.receiveList({ type: "topics", world: 0, topics: [], pose_topics: {} });
+  session.topics.receiveList(TOPICS);
   press("n", { ctrlKey: true });
   press("n", {}, elements["model-filter"]);
   for (const key of ["z", "y", "c", "v"]) press(key, { ctrlKey: true }, elements["model-filter"]);
@@ -144,10 +122,7 @@ test("arrows and signs move, zoom and turn the view", () => {
   const { camera } = stage;
   press("ArrowUp");
   press("ArrowLeft");
-  assert.deepEqual(
-    [camera.x, camera.y].map((value) => value.toFixed(2)),
-    ["-2.40", "2.40"],
-  );
+  assert.equal(`${camera.x.toFixed(2)} ${camera.y.toFixed(2)}`, "-2.40 2.40");
   press("=");
   assert.equal(camera.zoom, 25);
   press("-");
@@ -179,35 +154,17 @@ test("Enter clicks at the centre of the view", () => {
 });
 
 test("the help lists each key once", () => {
-  const { hotkeys, elements } = open();
-  hotkeys.createHelp();
-  const names = elements["help-content"].querySelectorAll("kbd").map((key) => key.textContent);
+  const names = open().helpKeys();
   for (const name of ["Space", "Esc", "Ctrl+Z", "Ctrl+Shift+Z", "Ctrl+Y", "Ctrl+C", "Ctrl+V"])
     assert.ok(names.includes(name), name);
   assert.equal(names.length, new Set(names).size);
 });
 
-test("the help lists the keys that the page has", () => {
-  const keys = (options, withTopics) => {
-    const { hotkeys, session, elements } = open(options);
-    if (withTopics) session.topics.receiveList({ type: "topics", world: 0, topics: [], pose_topics: {} });
-    hotkeys.createHelp();
-    return elements["help-content"].querySelectorAll("kbd").map((key) => key.textContent);
-  };
-  const all = keys({}, true);
-  assert.ok(all.includes("O") && all.includes("I"));
-  const ofReadOnly = keys({ readOnly: true }, true);
-  for (const key of ["O", "I", "N", "Ctrl+Z", "Ctrl+V"]) assert.ok(!ofReadOnly.includes(key), key);
-  assert.ok(!keys({}, false).includes("O"));
-});
-
 test("the help begins with what the device has", () => {
-  const first = ({ hotkeys, elements }) => {
+  const { hotkeys, elements } = open();
+  for (const first of ["Keys", "Touch"]) {
+    window.matchMedia = () => ({ matches: first === "Touch" });
     hotkeys.createHelp();
-    return elements["help-content"].querySelector("h3").textContent;
-  };
-  const opened = open();
-  assert.equal(first(opened), "Keys");
-  Object.assign(window, { matchMedia: () => ({ matches: true }) });
-  assert.equal(first(opened), "Touch");
+    assert.equal(elements["help-content"].querySelector("h3").textContent, first);
+  }
 });

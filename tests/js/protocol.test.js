@@ -20,6 +20,11 @@ function message(kind, words, { version = 1, world = 3, time = 2.5 } = {}) {
 /** Marks a number as a float. */
 const f = (...values) => values.map((value) => [value]);
 
+/** Returns the id, the pose and the ranges of each scan. */
+function scansOf(buffer) {
+  return decodeBinary(buffer).scans.map(({ id, pose, ranges }) => [id, pose, [...ranges]]);
+}
+
 test("edges of a layer", () => {
   const { edges, ...rest } = decodeBinary(message(1, [2, 1, ...f(1, 2, 3, 4)]));
   assert.deepEqual(rest, { kind: "edges", world: 3, time: 2.5, layer: 2 });
@@ -40,15 +45,11 @@ test("poses with and without ids", () => {
 test("scans in groups of the same number of beams", () => {
   const first = [2, 1, 5, 6, ...f(1, 2, 3, 4, 5, 6), ...f(0.5, 0.25)];
   const second = [1, 2, 7, ...f(7, 8, 9), ...f(1.5, -Infinity)];
-  const { scans } = decodeBinary(message(3, [2, ...first, ...second]));
-  assert.deepEqual(
-    scans.map(({ id, pose, ranges }) => [id, pose, [...ranges]]),
-    [
-      [5, [1, 2, 3], [0.5]],
-      [6, [4, 5, 6], [0.25]],
-      [7, [7, 8, 9], [1.5, -Infinity]],
-    ],
-  );
+  assert.deepEqual(scansOf(message(3, [2, ...first, ...second])), [
+    [5, [1, 2, 3], [0.5]],
+    [6, [4, 5, 6], [0.25]],
+    [7, [7, 8, 9], [1.5, -Infinity]],
+  ]);
 });
 
 test("compact scans have codes of 16 bits, or ranges", () => {
@@ -56,27 +57,19 @@ test("compact scans have codes of 16 bits, or ranges", () => {
   const codes = [pair(0, 4), pair(65533, 65534), pair(65535, 0)];
   const first = [1, 5, 16, 8, ...f(1, 2, 3), ...f(0.5), ...codes];
   const second = [1, 2, 32, 9, ...f(7, 8, 9), ...f(1.5, -Infinity)];
-  const { scans } = decodeBinary(message(5, [2, ...first, ...second]));
-  assert.deepEqual(
-    scans.map(({ id, pose, ranges }) => [id, pose, [...ranges]]),
-    [
-      [8, [1, 2, 3], [0, 2, 32766.5, -Infinity, NaN]],
-      [9, [7, 8, 9], [1.5, -Infinity]],
-    ],
-  );
+  assert.deepEqual(scansOf(message(5, [2, ...first, ...second])), [
+    [8, [1, 2, 3], [0, 2, 32766.5, -Infinity, NaN]],
+    [9, [7, 8, 9], [1.5, -Infinity]],
+  ]);
   assert.throws(() => decodeBinary(message(5, [1, 1, 1, 8, 8, ...f(1, 2, 3), 0])), /of 8 bits/);
 });
 
 test("the codes of several scans have their own resolutions", () => {
   const poses = f(0, 0, 0, 1, 1, 1);
-  const { scans } = decodeBinary(message(5, [1, 2, 1, 16, 5, 6, ...poses, ...f(0.5, 0.25), 4 + 65536 * 4]));
-  assert.deepEqual(
-    scans.map(({ id, ranges }) => [id, [...ranges]]),
-    [
-      [5, [2]],
-      [6, [1]],
-    ],
-  );
+  assert.deepEqual(scansOf(message(5, [1, 2, 1, 16, 5, 6, ...poses, ...f(0.5, 0.25), 4 + 65536 * 4])), [
+    [5, [0, 0, 0], [2]],
+    [6, [1, 1, 1], [1]],
+  ]);
 });
 
 test("a message of an unknown kind is ignored", () => {
@@ -85,14 +78,9 @@ test("a message of an unknown kind is ignored", () => {
 
 test("another version and a short message are errors", () => {
   assert.throws(() => decodeBinary(message(1, [0, 0], { version: 2 })), /unsupported version 2/);
-  for (const [kind, words] of [
-    [1, [0, 5]],
-    [2, [5]],
-    [3, [1, 5, 5]],
-    [4, [5]],
-    [5, [1, 5, 5, 16]],
-  ]) {
-    assert.throws(() => decodeBinary(message(kind, words)), RangeError);
+  const short = { 1: [0, 5], 2: [5], 3: [1, 5, 5], 4: [5], 5: [1, 5, 5, 16] };
+  for (const [kind, words] of Object.entries(short)) {
+    assert.throws(() => decodeBinary(message(Number(kind), words)), RangeError);
   }
 });
 
@@ -102,17 +90,11 @@ test("marks of a topic with texts", () => {
   padded.set(text);
   const tail = [...new Uint32Array(padded.buffer)];
   const head = [7, 1, 1, text.length, ...f(1, 2, 3, 4, 0.5), ...f(1, 2, 3, 4, 5, 6), 0x11223344, 0x55667788];
-  const { lines, lineColors, triangles, triangleColors, ...rest } = decodeBinary(
-    message(6, [...head, ...tail]),
-  );
+  const decoded = decodeBinary(message(6, [...head, ...tail]));
+  const { lines, lineColors, triangles, triangleColors, ...rest } = decoded;
   assert.deepEqual(rest, { kind: "marks", world: 3, time: 2.5, topic: 7, texts: [[1, 2, "ä"]] });
-  assert.deepEqual(
-    [[...lines], [...triangles]],
-    [
-      [1, 2, 3, 4, 0.5],
-      [1, 2, 3, 4, 5, 6],
-    ],
-  );
+  assert.deepEqual([...lines], [1, 2, 3, 4, 0.5]);
+  assert.deepEqual([...triangles], [1, 2, 3, 4, 5, 6]);
   assert.deepEqual([[...lineColors], [...triangleColors]], [[0x11223344], [0x55667788]]);
 });
 

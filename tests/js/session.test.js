@@ -1,12 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { settle } from "./fake_page.js";
-import { describeModel, models, poses, ROBOT, showRoom, status } from "./fake_server.js";
-
-function hello(worlds, fields = {}) {
-  const names = worlds.map((world) => ({ world, name: "" }));
-  return { type: "hello", title: "flatland", read_only: false, worlds: names, ...fields };
-}
+import { describeModel, hello, models, poses, ROBOT, showRoom, status } from "./fake_server.js";
 
 /** Returns the names of events as they occur. */
 function record(session, ...names) {
@@ -32,20 +27,9 @@ test("changes of a task are one request to the server", async () => {
   session.select("robot");
   session.select("robot");
   await settle();
-  assert.deepEqual(connection.take("look"), [
-    {
-      worlds: [0],
-      scans: true,
-      compact_scans: true,
-      frames: true,
-      history: true,
-      inspect: ROBOT,
-      series: ["/odom/pose/0"],
-      topics: [],
-      topic_values: [],
-      hidden: false,
-    },
-  ]);
+  const views = { worlds: [0], scans: true, compact_scans: true, frames: true, history: true };
+  const values = { inspect: ROBOT, series: ["/odom/pose/0"], topics: [], topic_values: [] };
+  assert.deepEqual(connection.take("look"), [{ ...views, ...values, hidden: false }]);
 });
 
 test("a grid needs neither frames nor numbers nor earlier states", async () => {

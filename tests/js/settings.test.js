@@ -3,14 +3,6 @@ import { test } from "node:test";
 import { loadSetting, saveSetting } from "../../flatland/web/page/js/settings.js";
 import { openPage } from "./fake_page.js";
 
-test("a preference is kept under the prefix of the page", () => {
-  openPage();
-  assert.equal(loadSetting("theme"), null);
-  saveSetting("theme", "dark");
-  assert.equal(loadSetting("theme"), "dark");
-  assert.equal(window.localStorage.getItem("flatland.theme"), "dark");
-});
-
 test("a browser that denies access has no preferences", () => {
   openPage();
   Object.defineProperty(window, "localStorage", {

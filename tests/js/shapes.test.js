@@ -3,16 +3,12 @@ import { test } from "node:test";
 import { shapeEdges, shapePoints, shapesExtent, shapesRadius } from "../../flatland/web/page/js/shapes.js";
 import { SQUARE } from "./fake_server.js";
 
+const START = [0, -6];
+const END = [1, 0];
 const SHAPES = [
   { kind: "polygon", points: SQUARE },
   { kind: "circle", center: [3, 4], radius: 2 },
-  {
-    kind: "edges",
-    points: [
-      [0, -6],
-      [1, 0],
-    ],
-  },
+  { kind: "edges", points: [START, END] },
 ];
 
 test("the radius contains all shapes", () => {

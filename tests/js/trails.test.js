@@ -2,29 +2,23 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { TRAIL_CAPACITY, Trails } from "../../flatland/web/page/js/trails.js";
 
-function segments(trails) {
-  return Array.from({ length: trails.added }, (_, i) => [...trails.segments.subarray(4 * i, 4 * i + 4)]);
+/** Returns the coordinates of each segment as a text. */
+function segments({ added, segments }) {
+  return Array.from({ length: added }, (_, i) => segments.subarray(4 * i, 4 * i + 4).join(" "));
 }
 
 test("a trail connects the positions of a model", () => {
   const trails = new Trails();
   trails.setTime(3);
   for (const x of [0, 1, 1.0625, 2]) trails.extend(7, x, 0.5, 4);
-  assert.deepEqual(segments(trails), [
-    [0, 0.5, 1, 0.5],
-    [1, 0.5, 1.0625, 0.5],
-    [1.0625, 0.5, 2, 0.5],
-  ]);
+  assert.deepEqual(segments(trails), ["0 0.5 1 0.5", "1 0.5 1.0625 0.5", "1.0625 0.5 2 0.5"]);
   assert.equal(trails.colors[0], 4);
 });
 
 test("short steps are collected, and long steps leave a gap", () => {
   const trails = new Trails();
   for (const x of [0, 0.03125, 0.0625, 5, 6]) trails.extend(7, x, 0, 0);
-  assert.deepEqual(segments(trails), [
-    [0, 0, 0.0625, 0],
-    [5, 0, 6, 0],
-  ]);
+  assert.deepEqual(segments(trails), ["0 0 0.0625 0", "5 0 6 0"]);
 });
 
 test("times are relative to the first segment", () => {

@@ -1,15 +1,13 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { ViewLink } from "../../flatland/web/page/js/view_link.js";
-import { dispatch, openPage } from "./fake_page.js";
-import { createStage, showRoom } from "./fake_server.js";
+import { dispatch } from "./fake_page.js";
+import { hello, openRoom } from "./fake_server.js";
 
 function open(t, hash = "", options = {}) {
   t.mock.timers.enable({ apis: ["setTimeout"] });
-  openPage({ hash });
-  const { connection, session } = showRoom(options);
-  const stage = createStage(session);
-  return { connection, session, stage, link: new ViewLink(session, stage) };
+  const room = openRoom({ hash, ...options });
+  return { ...room, link: new ViewLink(room.session, room.stage) };
 }
 
 function follow(hash) {
@@ -25,17 +23,9 @@ test("a link restores the view, the selection and the displays", (t) => {
   assert.deepEqual([stage.followed, session.selectedName], ["robot", "crate"]);
   const { names, scans, trails, layers } = session.displays;
   assert.deepEqual([names, scans, trails, layers], [false, false, true, true]);
-  const again = new URLSearchParams(link.hash().slice(1));
-  assert.deepEqual(Object.fromEntries(again), {
-    x: "2.500",
-    y: "-1.000",
-    zoom: "40.00",
-    turn: "0.200",
-    follow: "robot",
-    select: "crate",
-    show: "trails",
-    hide: "scans,names",
-  });
+  const again = Object.fromEntries(new URLSearchParams(link.hash().slice(1)));
+  const view = { x: "2.500", y: "-1.000", zoom: "40.00", turn: "0.200", follow: "robot" };
+  assert.deepEqual(again, { ...view, select: "crate", show: "trails", hide: "scans,names" });
 });
 
 test("the address of the first view has no hash", (t) => {
@@ -98,8 +88,7 @@ test("invalid numbers are ignored", (t) => {
 test("the world of the address is displayed as soon as the server lists it", (t) => {
   const { connection, session, link } = open(t, "#world=2&select=robot", { worlds: 2 });
   assert.equal(session.currentIndex, null);
-  const worlds = [0, 1, 2].map((world) => ({ world, name: "" }));
-  connection.emit("message", { type: "hello", title: "flatland", read_only: false, worlds });
+  connection.emit("message", hello([0, 1, 2]));
   assert.deepEqual([session.currentIndex, session.selectedName], [2, "robot"]);
   assert.ok(link.hash().startsWith("#world=2"));
 });

@@ -482,16 +482,6 @@ class Chromium:
 
         return Path(wait_until(f"a download {pattern}", found))
 
-    def freeze(self) -> None:
-        """Freezes the page, as the browser does with tabs that have been hidden for long."""
-        self.command("Page.setWebLifecycleState", state="frozen")
-
-    def thaw(self) -> None:
-        """Continues a frozen page, which becomes visible."""
-        self.command("Page.setWebLifecycleState", state="active")
-        with self.minimized():  # otherwise the page remains hidden
-            pass
-
 
 def line(start: Point, end: Point, steps: int) -> list[Point]:
     """Returns points from `start` (exclusive) to `end` (inclusive)."""

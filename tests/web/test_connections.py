@@ -1,4 +1,4 @@
-"""Connections: access, a restart of the simulator, a sleeping browser."""
+"""Connections: access, a simulator that halts, and one that starts again."""
 
 from __future__ import annotations
 
@@ -7,11 +7,8 @@ from pathlib import Path
 
 from chromium import Chromium
 from free_ports import free_port
-from viewed_world import ViewedWorld, ViewProgram, viewed_room, write_room
+from viewed_world import ViewProgram, viewed_room, write_room
 from viewer_page import ViewerPage
-from waiting import wait_until
-
-from flatland import Twist
 
 
 def test_the_page_requires_the_token(browser: Chromium, tmp_path: Path) -> None:
@@ -27,58 +24,9 @@ def test_the_page_requires_the_token(browser: Chromium, tmp_path: Path) -> None:
     browser.console()
 
 
-def test_a_page_of_another_site_cannot_use_the_simulator(
-    room: ViewedWorld, browser: Chromium
+def test_the_page_survives_a_halt_and_a_restart_of_the_simulator(
+    browser: Chromium, tmp_path: Path
 ) -> None:
-    browser.open("data:text/html,<title>elsewhere</title>")
-    result = browser.run_async(
-        """
-        const [address, done] = arguments;
-        const socket = new WebSocket(address, ["flatland.1"]);
-        socket.onmessage = () => done("message");
-        socket.onclose = () => done("closed");
-        """,
-        f"ws://127.0.0.1:{room.viewer.port}/ws",
-    )
-    assert result == "closed"
-    browser.console()
-
-
-def test_a_sleeping_browser_does_not_hold_up_the_simulation(
-    room: ViewedWorld, page: ViewerPage
-) -> None:
-    browser = page.browser
-    room.ask(lambda: room.world.command("/cmd_vel").set(Twist(angular_z=1.0)))
-    browser.freeze()
-    try:
-        start = room.time()
-        wait_until("half a second passes", lambda: room.time() > start + 0.5)
-    finally:
-        browser.thaw()
-    browser.until("flatland.state.worlds[0].time > arguments[0]", start + 0.5)
-    page.wait_for_connection("connected")
-
-
-def test_a_simulator_that_does_not_respond_is_shown(browser: Chromium, tmp_path: Path) -> None:
-    program = ViewProgram(write_room(tmp_path), "--port", "0")
-    page = ViewerPage(browser)
-    try:
-        page.open(program.url)
-        program.process.send_signal(signal.SIGSTOP)
-        page.wait_for_connection("no response")
-        assert browser.evaluate("document.querySelector('#message').checkVisibility()")
-        browser.until("getComputedStyle(document.querySelector('#canvas')).opacity < 0.5")
-        program.process.send_signal(signal.SIGCONT)
-        page.wait_for_connection("connected")
-        browser.until("getComputedStyle(document.querySelector('#canvas')).opacity === '1'")
-    finally:
-        program.process.send_signal(signal.SIGCONT)
-        program.stop()
-        browser.open("about:blank")
-        browser.console()
-
-
-def test_the_page_survives_a_restart_of_the_simulator(browser: Chromium, tmp_path: Path) -> None:
     world = write_room(tmp_path)
     # A port of the system's range could be that of an attempt of the browser to reconnect.
     port = str(free_port())
@@ -87,6 +35,13 @@ def test_the_page_survives_a_restart_of_the_simulator(browser: Chromium, tmp_pat
     try:
         page.open(program.url)
         assert page.models().keys() == {"robot", "crate"}
+        program.process.send_signal(signal.SIGSTOP)
+        page.wait_for_connection("no response")
+        assert browser.evaluate("document.querySelector('#message').checkVisibility()")
+        browser.until("getComputedStyle(document.querySelector('#canvas')).opacity < 0.5")
+        program.process.send_signal(signal.SIGCONT)
+        page.wait_for_connection("connected")
+        browser.until("getComputedStyle(document.querySelector('#canvas')).opacity === '1'")
         program.kill()
         page.wait_for_connection("reconnecting")
         text = world.read_text().replace("pose: [2, -2, 0]", "pose: [3, 3, 0]")
@@ -97,6 +52,7 @@ def test_the_page_survives_a_restart_of_the_simulator(browser: Chromium, tmp_pat
         seen = page.time()
         browser.until("flatland.state.worlds[0].time > arguments[0]", seen)
     finally:
+        program.process.send_signal(signal.SIGCONT)
         program.stop()
         browser.open("about:blank")
         browser.console()

@@ -50,20 +50,8 @@ def test_the_user_returns_to_earlier_states(room: ViewedWorld, page: ViewerPage)
     browser.click("#history-newest")
     wait_until("the newest state", lambda: room.pose("robot")[0] > start[0] + 0.3)
     browser.until("document.querySelector('#history-newest').disabled")
-    browser.evaluate(f"{slider}.focus()")
-    browser.key("Home")
-    browser.until("!document.querySelector('#history-continue').disabled")
-    browser.click("#history-continue")
-    page.wait_for_pause(False)
-
-    # A reset is undone.
-    room.ask(lambda: room.world.command("/cmd_vel").set(Twist()))
-    room.ask(lambda: room.world.move_model("robot", (3, 3, 0)))
     browser.click("#reset")
     wait_until("the first state", lambda: room.pose("robot") == pytest.approx((-2, 1, 0), abs=1e-3))
-    browser.until("document.querySelector('#notices .outlined') !== null")
-    browser.key("z", modifiers=CTRL)
-    wait_until("the state before", lambda: room.pose("robot") == pytest.approx((3, 3, 0), abs=0.05))
 
 
 def test_the_world_is_saved_by_the_menu(room: ViewedWorld, page: ViewerPage) -> None:

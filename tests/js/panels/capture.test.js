@@ -1,12 +1,10 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Capture } from "../../../flatland/web/page/js/panels/capture.js";
-import { openPage } from "../fake_page.js";
-import { createStage, showRoom, worldMessage } from "../fake_server.js";
+import { openRoom, worldMessage } from "../fake_server.js";
 
 function open({ formats = ["video/webm"] } = {}) {
-  const elements = openPage();
-  const { connection, session } = showRoom();
+  const room = openRoom();
   const recorders = [];
   class FakeRecorder {
     static isTypeSupported(format) {
@@ -26,12 +24,8 @@ function open({ formats = ["video/webm"] } = {}) {
   }
   window.MediaRecorder = globalThis.MediaRecorder = FakeRecorder;
   const tracks = [{ stop: () => tracks.push("stopped") }];
-  const stage = createStage(session);
-  stage.canvas.captureStream = () => ({ getTracks: () => [tracks[0]] });
-  const notices = [];
-  session.on("notice", ({ text }) => notices.push(text));
-  const capture = new Capture(stage, session);
-  return { elements, connection, stage, notices, recorders, tracks, capture };
+  room.stage.canvas.captureStream = () => ({ getTracks: () => [tracks[0]] });
+  return { ...room, recorders, tracks, capture: new Capture(room.stage, room.session) };
 }
 
 test("the name of a file contains that of the world, without special characters", () => {

@@ -1,14 +1,13 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { createDisplays } from "../../../flatland/web/page/js/panels/displays.js";
-import { dispatch, openPage } from "../fake_page.js";
-import { showRoom, worldMessage } from "../fake_server.js";
+import { dispatch } from "../fake_page.js";
+import { openRoom, worldMessage } from "../fake_server.js";
 
 function open() {
-  const elements = openPage();
-  const shown = showRoom();
-  createDisplays(shown.session);
-  return { elements, ...shown };
+  const room = openRoom();
+  createDisplays(room.session);
+  return room;
 }
 
 function check(box, checked) {
@@ -32,16 +31,11 @@ test("each layer of several has a check box", () => {
   connection.emit("message", worldMessage(0, { layers }));
   const list = elements["layer-list"];
   assert.ok(!list.hidden);
-  assert.deepEqual(
-    list.querySelectorAll("label").map((label) => label.textContent),
-    ["walls", "glass"],
-  );
+  const names = list.querySelectorAll("label").map((label) => label.textContent);
+  assert.deepEqual(names, ["walls", "glass"]);
   let redrawn = 0;
   session.on("redraw", () => redrawn++);
   check(list.querySelectorAll("input")[1], false);
-  assert.deepEqual(
-    world.layers.map(({ visible }) => visible),
-    [true, false],
-  );
-  assert.equal(redrawn, 1);
+  const visible = world.layers.map((layer) => layer.visible);
+  assert.deepEqual([visible, redrawn], [[true, false], 1]);
 });

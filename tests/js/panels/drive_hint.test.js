@@ -2,17 +2,16 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { createDriveHint } from "../../../flatland/web/page/js/panels/drive_hint.js";
 import { Drive } from "../../../flatland/web/page/js/tools/drive.js";
-import { openPage } from "../fake_page.js";
-import { describeModel, models, showRoom } from "../fake_server.js";
+import { describeModel, models, openRoom } from "../fake_server.js";
 
 function open({ prepare = () => {}, ...options } = {}) {
-  const elements = openPage();
+  const room = openRoom(options);
+  const { elements, session } = room;
   prepare();
-  const { connection, session } = showRoom(options);
   const drive = new Drive(session);
   createDriveHint(session, drive);
   const text = () => (elements["drive-hint"].hidden ? "" : elements["drive-hint-text"].textContent);
-  return { elements, connection, session, drive, text };
+  return { ...room, drive, text };
 }
 
 test("the hint explains how to drive, in two steps", (t) => {

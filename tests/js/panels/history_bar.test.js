@@ -1,8 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { HistoryBar } from "../../../flatland/web/page/js/panels/history_bar.js";
-import { dispatch, openPage, settle } from "../fake_page.js";
-import { showRoom } from "../fake_server.js";
+import { dispatch, settle } from "../fake_page.js";
+import { hello, openRoom } from "../fake_server.js";
 
 const MOMENTS = [3, 4, 7].map((moment) => ({ moment, time: moment / 2, label: "" }));
 const NEWEST = { moment: 9, time: 5, label: "before going back" };
@@ -12,8 +12,7 @@ function history(fields = {}) {
 }
 
 function open(options) {
-  const elements = openPage();
-  const { connection, session } = showRoom(options);
+  const { elements, connection, session, notices } = openRoom(options);
   new HistoryBar(session);
   connection.replies.visit = { effect: "" };
   connection.emit("message", history());
@@ -28,7 +27,7 @@ function open(options) {
     elements["history-text"].textContent,
     elements["history-continue"].disabled,
   ];
-  return { elements, connection, session, slide, visits, shown };
+  return { elements, connection, session, notices, slide, visits, shown };
 }
 
 test("the last position is the newest state", () => {
@@ -104,9 +103,7 @@ test("a visit that another client replaces does not block the slider", async () 
 });
 
 test("after an error, the slider shows the state of the world", async () => {
-  const { connection, session, slide, shown } = open();
-  const notices = [];
-  session.on("notice", ({ text }) => notices.push(text));
+  const { connection, notices, slide, shown } = open();
   connection.replies.visit = new Error("this state is not kept any more");
   slide(0);
   await settle();
@@ -125,8 +122,7 @@ test("a connection that is lost during a visit does not block the slider", async
   fail();
   await settle();
   connection.emit("state", "connected");
-  const worlds = [{ world: 0, name: "room 0" }];
-  connection.emit("message", { type: "hello", title: "", read_only: false, worlds });
+  connection.emit("message", hello([0]));
   assert.ok(elements["history-slider"].disabled, "the states of the new connection are not known");
   assert.deepEqual(visits(), [3], "the position that waited belongs to the lost connection");
   connection.replies.visit = { effect: "" };

@@ -1,18 +1,16 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { createModelList } from "../../../flatland/web/page/js/panels/model_list.js";
-import { dispatch, nextFrame, openPage } from "../fake_page.js";
-import { createStage, describeModel, models, poses, showRoom } from "../fake_server.js";
+import { dispatch, nextFrame } from "../fake_page.js";
+import { describeModel, models, openRoom, poses } from "../fake_server.js";
 
 function open(options) {
-  const elements = openPage();
-  const { connection, session } = showRoom(options);
-  const stage = createStage(session);
-  createModelList(session, stage);
-  session.emit("models", session.world);
+  const room = openRoom(options);
+  createModelList(room.session, room.stage);
+  room.session.emit("models", room.world);
   nextFrame();
-  const rows = () => elements["model-list"].querySelectorAll("button");
-  return { elements, connection, session, stage, rows };
+  const rows = () => room.elements["model-list"].querySelectorAll("button");
+  return { ...room, rows };
 }
 
 function names(rows) {
@@ -25,10 +23,8 @@ test("all models are listed, and a click selects a model", () => {
   assert.equal(elements["model-count"].textContent, "2");
   rows()[1].click();
   assert.equal(session.selectedName, "crate");
-  assert.deepEqual(
-    rows().map((row) => row.getAttribute("aria-pressed")),
-    ["false", "true"],
-  );
+  const pressed = rows().map((row) => row.getAttribute("aria-pressed"));
+  assert.deepEqual(pressed, ["false", "true"]);
 });
 
 test("models that can be driven are marked", () => {

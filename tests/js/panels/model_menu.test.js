@@ -7,11 +7,8 @@ function open(x = 1195, y = 10) {
   const elements = openPage();
   const menu = new ModelMenu();
   const calls = [];
-  const items = ["Centre", "Follow", "Delete"].map((text) => ({
-    text,
-    icon: "x",
-    run: () => calls.push(text),
-  }));
+  const item = (text) => ({ text, icon: "x", run: () => calls.push(text) });
+  const items = ["Centre", "Follow", "Delete"].map(item);
   menu.open(x, y, items, elements.canvas);
   const key = (name) => dispatch(elements.menu, "keydown", { key: name });
   return { elements, calls, key, buttons: elements.menu.children };
@@ -44,13 +41,8 @@ test("arrows move the focus around, Escape closes", () => {
 
 test("a press elsewhere closes the menu", () => {
   const { elements, buttons } = open();
-  for (const [target, hidden] of [
-    [buttons[1], false],
-    [elements.canvas, true],
-  ]) {
-    const event = new Event("pointerdown");
-    Object.defineProperty(event, "target", { value: target });
-    document.dispatchEvent(event);
-    assert.equal(elements.menu.hidden, hidden);
+  for (const target of [buttons[1], elements.canvas]) {
+    dispatch(document, "pointerdown", { target });
+    assert.equal(elements.menu.hidden, target === elements.canvas);
   }
 });

@@ -1,13 +1,11 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { createNotices } from "../../../flatland/web/page/js/panels/notices.js";
-import { openPage } from "../fake_page.js";
-import { showRoom } from "../fake_server.js";
+import { openRoom } from "../fake_server.js";
 
 function open(t) {
   t.mock.timers.enable({ apis: ["setTimeout"] });
-  const elements = openPage();
-  const { session } = showRoom();
+  const { elements, session } = openRoom();
   createNotices(session);
   const texts = () => elements.notices.querySelectorAll("p").map((each) => each.textContent);
   return { elements, session, texts };

@@ -1,8 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Plots } from "../../../flatland/web/page/js/panels/plots.js";
-import { dispatch, openPage, settle } from "../fake_page.js";
-import { showRoom } from "../fake_server.js";
+import { dispatch, settle } from "../fake_page.js";
+import { openRoom } from "../fake_server.js";
 
 const NAMES = ["/odom/pose/0", "/odom/pose/1"];
 
@@ -33,8 +33,7 @@ class RecordedPlot {
 }
 
 async function open(options) {
-  const elements = openPage();
-  const { connection, session } = showRoom(options);
+  const { elements, connection, session, notices } = openRoom(options);
   connection.replies.describe_series = NAMES;
   RecordedPlot.all = [];
   const plots = new Plots(session, () => false, options?.load ?? (async () => RecordedPlot));
@@ -49,7 +48,7 @@ async function open(options) {
     elements["plot-series"].value = text;
     dispatch(elements["plot-series"], "input");
   };
-  return { elements, connection, session, plots, values, wanted, type };
+  return { elements, connection, session, notices, plots, values, wanted, type };
 }
 
 function plotted(elements) {
@@ -100,13 +99,8 @@ test("the latest times are drawn until the user selects a range", async (t) => {
   await settle();
   const [chart] = RecordedPlot.all;
   values(40, { [NAMES[0]]: 0.5 });
-  assert.deepEqual(
-    [chart.data, chart.range],
-    [
-      [[40], [0.5]],
-      [10, 40],
-    ],
-  );
+  assert.deepEqual(chart.data, [[40], [0.5]]);
+  assert.deepEqual(chart.range, [10, 40]);
   elements["plot-window"].value = "10";
   dispatch(elements["plot-window"], "change");
   assert.deepEqual(chart.range, [30, 40]);
@@ -141,17 +135,9 @@ test("samples are collected in the order of their time", async () => {
   values(1, { [NAMES[0]]: 0.75 });
   values(2, { other: 3 });
   values(3, { [NAMES[0]]: -1.25 });
-  const { times, samples } = {
-    times: plots.plots.get(NAMES[0]).times,
-    samples: plots.plots.get(NAMES[0]).values,
-  };
-  assert.deepEqual(
-    [times, samples],
-    [
-      [1, 3],
-      [0.5, -1.25],
-    ],
-  );
+  const { times, values: samples } = plots.plots.get(NAMES[0]);
+  assert.deepEqual(times, [1, 3]);
+  assert.deepEqual(samples, [0.5, -1.25]);
   assert.equal(elements["plot-list"].querySelector("output").textContent, "−1.25");
   values(0, { [NAMES[0]]: 9 });
   assert.deepEqual(times, [0], "the simulation was reset");
@@ -166,9 +152,7 @@ test("old samples are discarded", async () => {
 });
 
 test("the number of plots is limited", async () => {
-  const { session, plots } = await open();
-  const notices = [];
-  session.on("notice", ({ text }) => notices.push(text));
+  const { notices, plots } = await open();
   for (let i = 0; i < 13; i++) plots.add(`/n/${i}`);
   assert.equal(plots.plots.size, 12);
   assert.deepEqual(notices, ["At most 12 plots are shown"]);
@@ -191,24 +175,15 @@ test("numbers of other topics are plotted, also if their values are slightly old
   plots.add(name);
   await settle();
   assert.deepEqual(session.demands().topic_values, ["/amcl_pose"]);
+  const message = { type: "topic_values", world: 0, topic: "/amcl_pose" };
   const send = (time, x) =>
-    connection.emit("message", {
-      type: "topic_values",
-      world: 0,
-      topic: "/amcl_pose",
-      time,
-      value: { pose: { position: { x } } },
-    });
+    connection.emit("message", { ...message, time, value: { pose: { position: { x } } } });
   send(1, 5);
   values(2, {});
   send(1.9, 6);
-  assert.deepEqual(
-    [plots.plots.get(name).times, plots.plots.get(name).values],
-    [
-      [1, 2],
-      [5, 6],
-    ],
-  );
+  const plot = plots.plots.get(name);
+  assert.deepEqual(plot.times, [1, 2]);
+  assert.deepEqual(plot.values, [5, 6]);
   send(0.5, 7); // The world was reset.
-  assert.deepEqual(plots.plots.get(name).values, [7]);
+  assert.deepEqual(plot.values, [7]);
 });

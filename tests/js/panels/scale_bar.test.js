@@ -1,13 +1,10 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { createScaleBar } from "../../../flatland/web/page/js/panels/scale_bar.js";
-import { openPage } from "../fake_page.js";
-import { createStage, showRoom } from "../fake_server.js";
+import { openRoom } from "../fake_server.js";
 
 test("the bar has a round length of at most 120 pixels", () => {
-  const elements = openPage();
-  const { session } = showRoom();
-  const stage = createStage(session);
+  const { elements, session, stage } = openRoom();
   createScaleBar(session, stage);
   for (const [zoom, width, text] of [
     [20, "100px", "5 m"],
@@ -22,9 +19,7 @@ test("the bar has a round length of at most 120 pixels", () => {
 });
 
 test("a grid of worlds has no scale", () => {
-  const elements = openPage();
-  const { session } = showRoom({ worlds: 2 });
-  const stage = createStage(session);
+  const { elements, session, stage } = openRoom({ worlds: 2 });
   createScaleBar(session, stage);
   stage.emit("frame", undefined);
   assert.ok(elements.scale.hidden);

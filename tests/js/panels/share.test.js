@@ -1,14 +1,11 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { createShare } from "../../../flatland/web/page/js/panels/share.js";
-import { openPage, settle } from "../fake_page.js";
-import { showRoom } from "../fake_server.js";
+import { settle } from "../fake_page.js";
+import { openRoom } from "../fake_server.js";
 
 async function share({ clipboard, search = "" }) {
-  const elements = openPage({ search });
-  const { session } = showRoom();
-  const notices = [];
-  session.on("notice", ({ text }) => notices.push(text));
+  const { elements, session, notices } = openRoom({ search });
   Object.defineProperty(globalThis, "navigator", { value: { clipboard }, configurable: true });
   let written = 0;
   createShare(session, { write: () => written++ });

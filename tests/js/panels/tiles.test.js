@@ -1,24 +1,19 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { createTiles } from "../../../flatland/web/page/js/panels/tiles.js";
-import { openPage } from "../fake_page.js";
-import { createStage, showRoom, status } from "../fake_server.js";
+import { openRoom, status } from "../fake_server.js";
 
 function open(options) {
-  const elements = openPage();
-  const shown = showRoom(options);
-  const stage = createStage(shown.session);
-  createTiles(shown.session, stage);
-  return { elements, stage, ...shown };
+  const room = openRoom(options);
+  createTiles(room.session, room.stage);
+  return room;
 }
 
 test("a click on a tile enlarges a world, and a button returns to the grid", () => {
   const { elements, session, stage } = open({ worlds: 3 });
   assert.equal(elements["world-name"].textContent, "3 worlds");
-  assert.deepEqual(
-    elements.tiles.children.map((tile) => tile.textContent),
-    ["room 0", "room 1", "room 2"],
-  );
+  const labels = elements.tiles.children.map((tile) => tile.textContent);
+  assert.deepEqual(labels, ["room 0", "room 1", "room 2"]);
   assert.ok(elements["all-worlds"].hidden);
   elements.tiles.children[2].click();
   assert.deepEqual([session.currentIndex, stage.isFitting, elements.tiles.hidden], [2, true, true]);
@@ -30,11 +25,9 @@ test("a click on a tile enlarges a world, and a button returns to the grid", () 
 
 test("tiles are where the worlds are drawn", () => {
   const { elements, stage } = open({ worlds: 2 });
-  const places = elements.tiles.children.map(({ style }) => parseFloat(style.left));
-  assert.deepEqual(
-    places,
-    stage.tiles().map(({ left }) => left),
-  );
+  const shown = elements.tiles.children.map(({ style }) => parseFloat(style.left));
+  const drawn = stage.tiles().map(({ left }) => left);
+  assert.deepEqual(shown, drawn);
 });
 
 test("the label of a tile shows a pause", () => {

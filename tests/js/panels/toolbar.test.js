@@ -3,25 +3,19 @@ import { test } from "node:test";
 import { createToolbar } from "../../../flatland/web/page/js/panels/toolbar.js";
 import { PanTool } from "../../../flatland/web/page/js/tools/pan_tool.js";
 import { ToolBox } from "../../../flatland/web/page/js/tools/tool_box.js";
-import { openPage } from "../fake_page.js";
-import { createStage, showRoom } from "../fake_server.js";
+import { openRoom } from "../fake_server.js";
 
 function open(options, prepare = () => {}) {
-  const elements = openPage();
+  const { elements, session, stage } = openRoom(options);
   prepare();
-  const { connection, session } = showRoom(options);
-  const stage = createStage(session);
   const measure = Object.assign(new PanTool(), { hint: "Select the first point" });
   const tools = new ToolBox({ select: new PanTool(), pan: new PanTool(), measure, spawn: new PanTool() });
   const calls = [];
-  const action = (name) => () => calls.push(name);
-  createToolbar(session, stage, tools, {
-    toggleFollow: action("follow"),
-    zoomIn: action("in"),
-    zoomOut: action("out"),
-  });
+  const names = ["toggleFollow", "zoomIn", "zoomOut"];
+  const actions = Object.fromEntries(names.map((name) => [name, () => calls.push(name)]));
+  createToolbar(session, stage, tools, actions);
   session.emit("hello", undefined);
-  return { elements, connection, session, stage, tools, calls };
+  return { elements, session, stage, tools, calls };
 }
 
 function pressed(element) {
@@ -43,7 +37,7 @@ test("a model is followed if one is selected", () => {
   session.select("robot");
   elements.follow.click();
   stage.follow("robot");
-  assert.deepEqual([calls, pressed(elements.follow)], [["follow"], true]);
+  assert.deepEqual([calls, pressed(elements.follow)], [["toggleFollow"], true]);
 });
 
 test("the tools of one world are disabled in a grid", () => {

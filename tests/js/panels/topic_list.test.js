@@ -1,22 +1,26 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { createTopicList } from "../../../flatland/web/page/js/panels/topic_list.js";
-import { dispatch, openPage } from "../fake_page.js";
-import { showRoom } from "../fake_server.js";
+import { dispatch } from "../fake_page.js";
+import { openRoom } from "../fake_server.js";
 
 const PLAN = { id: 1, topic: "/plan", type: "nav_msgs/Path", drawn_as: "marks", status: "" };
 const MAP = { id: 2, topic: "/map", type: "nav_msgs/OccupancyGrid", drawn_as: "grid", status: "" };
 const ODOM = { id: 3, topic: "/odom", type: "nav_msgs/Odometry", drawn_as: null, status: "" };
 
 function open() {
-  const elements = openPage();
-  const shown = showRoom();
+  const room = openRoom();
   const plotted = [];
-  createTopicList(shown.session, (name) => plotted.push(name));
+  createTopicList(room.session, (name) => plotted.push(name));
   const list = (topics) =>
-    shown.connection.emit("message", { type: "topics", world: 0, topics, pose_topics: {} });
-  const find = (selector) => elements["topic-list"].querySelector(selector);
-  return { elements, plotted, list, find, topics: shown.session.topics, ...shown };
+    room.connection.emit("message", { type: "topics", world: 0, topics, pose_topics: {} });
+  const find = (selector) => room.elements["topic-list"].querySelector(selector);
+  return { plotted, list, find, topics: room.session.topics, ...room };
+}
+
+function check(box) {
+  box.checked = true;
+  dispatch(box, "change");
 }
 
 test("without topics of other programs, the list is hidden", () => {
@@ -42,9 +46,7 @@ test("topics are grouped by type and follow their publishers", () => {
 test("a check box shows a topic, whose status is displayed at its entry", () => {
   const { list, find, topics } = open();
   list([PLAN]);
-  const box = find("[data-topic=/plan]");
-  box.checked = true;
-  dispatch(box, "change");
+  check(find("[data-topic=/plan]"));
   assert.deepEqual([...topics.shown], ["/plan"]);
   assert.ok(find(".status").hidden);
   list([{ ...PLAN, status: 'no transform from "odom" to "map"' }]);
@@ -65,15 +67,9 @@ test("a control keeps the focus when other topics appear", () => {
 });
 
 test("the number of topics that are drawn is limited", () => {
-  const { list, find, topics, session } = open();
-  const notices = [];
-  session.on("notice", ({ text }) => notices.push(text));
+  const { list, find, topics, notices } = open();
   list(Array.from({ length: 33 }, (_, id) => ({ ...PLAN, id, topic: `/plan${id}` })));
-  for (let i = 0; i < 33; i++) {
-    const box = find(`[data-topic=/plan${i}]`);
-    box.checked = true;
-    dispatch(box, "change");
-  }
+  for (let i = 0; i < 33; i++) check(find(`[data-topic=/plan${i}]`));
   assert.equal(topics.shown.size, 32);
   assert.ok(!find("[data-topic=/plan32]").checked);
   assert.deepEqual(notices, ["At most 32 topics are shown"]);
@@ -84,8 +80,7 @@ test("a grid can have the colours of a costmap", () => {
   list([MAP]);
   const box = find("[data-costmap=/map]");
   assert.ok(!box.checked);
-  box.checked = true;
-  dispatch(box, "change");
+  check(box);
   assert.ok(topics.isCostmap("/map"));
 });
 

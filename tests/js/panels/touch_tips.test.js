@@ -7,14 +7,8 @@ function open(t) {
   t.mock.timers.enable({ apis: ["setTimeout"] });
   const elements = openPage();
   createTouchTips();
-  const send = (type, fields = {}) =>
-    dispatch(document, type, {
-      target: elements.fit,
-      pointerType: "touch",
-      clientX: 0,
-      clientY: 0,
-      ...fields,
-    });
+  const finger = { target: elements.fit, pointerType: "touch", clientX: 0, clientY: 0 };
+  const send = (type, fields = {}) => dispatch(document, type, { ...finger, ...fields });
   const shown = () => (elements.tip.hidden ? null : elements.tip.textContent);
   return { elements, send, shown };
 }

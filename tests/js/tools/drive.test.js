@@ -1,15 +1,14 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Drive } from "../../../flatland/web/page/js/tools/drive.js";
-import { dispatch, openPage, settle } from "../fake_page.js";
-import { describeModel, models, ROBOT, showRoom } from "../fake_server.js";
+import { dispatch, settle } from "../fake_page.js";
+import { describeModel, models, openRoom, ROBOT } from "../fake_server.js";
 
 function open(t, options) {
-  openPage();
   t.mock.timers.enable({ apis: ["setInterval"] });
-  const { connection, session } = showRoom(options);
-  session.select("robot");
-  return { connection, session, drive: new Drive(session) };
+  const room = openRoom(options);
+  room.session.select("robot");
+  return { ...room, drive: new Drive(room.session) };
 }
 
 /** Returns the velocities of all commands since the last call. */
@@ -19,28 +18,20 @@ function sent(connection) {
 
 test("each key drives in its direction", (t) => {
   const { drive } = open(t);
-  for (const [codes, expected] of [
-    [["ArrowUp"], [0.8, 0, 0]],
-    [["KeyS"], [-0.8, 0, 0]],
-    [["ArrowLeft"], [0, 0, 1]],
-    [["KeyD"], [0, 0, -1]],
-    [["KeyQ"], [0, 0.8, 0]],
-    [["KeyE"], [0, -0.8, 0]],
-    [
-      ["KeyW", "KeyA"],
-      [0.8, 0, 1],
-    ],
-    [
-      ["KeyW", "ArrowUp"],
-      [0.8, 0, 0],
-    ],
-    [
-      ["KeyW", "KeyS"],
-      [0, 0, 0],
-    ],
-  ]) {
-    for (const code of codes) assert.ok(drive.press(code));
-    assert.deepEqual(drive.velocity(), expected, `${codes}`);
+  const velocities = {
+    ArrowUp: [0.8, 0, 0],
+    KeyS: [-0.8, 0, 0],
+    ArrowLeft: [0, 0, 1],
+    KeyD: [0, 0, -1],
+    KeyQ: [0, 0.8, 0],
+    KeyE: [0, -0.8, 0],
+    "KeyW KeyA": [0.8, 0, 1],
+    "KeyW ArrowUp": [0.8, 0, 0],
+    "KeyW KeyS": [0, 0, 0],
+  };
+  for (const [codes, expected] of Object.entries(velocities)) {
+    for (const code of codes.split(" ")) assert.ok(drive.press(code));
+    assert.deepEqual(drive.velocity(), expected, codes);
     drive.stop();
   }
   assert.ok(!drive.press("KeyX"));
@@ -53,11 +44,8 @@ test("commands are repeated while a key is held, and the robot stops on release"
   drive.press("KeyW");
   drive.press("KeyW");
   t.mock.timers.tick(100);
-  assert.deepEqual(sent(connection), [
-    [0.8, 0, 0],
-    [0.8, 0, 0],
-    [0.8, 0, 0],
-  ]);
+  const ahead = [0.8, 0, 0];
+  assert.deepEqual(sent(connection), [ahead, ahead, ahead]);
   dispatch(document, "keyup", { code: "KeyW" });
   t.mock.timers.tick(1000);
   assert.deepEqual(sent(connection), [[0, 0, 0]]);
@@ -101,9 +89,7 @@ test("only a model with commands can be driven, and none of a read-only page", (
 });
 
 test("an error ends the drive", async (t) => {
-  const { connection, session, drive } = open(t);
-  const notices = [];
-  session.on("notice", ({ text }) => notices.push(text));
+  const { connection, notices, drive } = open(t);
   connection.replies.drive = new Error("not possible");
   drive.press("KeyW");
   await settle();

@@ -1,8 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { PointerInput } from "../../../flatland/web/page/js/tools/pointer.js";
-import { dispatch, openPage } from "../fake_page.js";
-import { createStage, showRoom } from "../fake_server.js";
+import { dispatch } from "../fake_page.js";
+import { openRoom } from "../fake_server.js";
 
 /** A tool that records its calls. */
 function recordingTool(handles) {
@@ -18,9 +18,7 @@ function recordingTool(handles) {
 }
 
 function open({ handles = true, worlds = 1 } = {}) {
-  openPage();
-  const { session } = showRoom({ worlds });
-  const stage = createStage(session);
+  const { session, stage } = openRoom({ worlds });
   const active = recordingTool(handles);
   const tools = { active, name: "select", updateHint() {} };
   const menus = [];
@@ -29,7 +27,12 @@ function open({ handles = true, worlds = 1 } = {}) {
     const rest = { pointerId: 1, pointerType: "mouse", button: 0, shiftKey: false, ...fields };
     return dispatch(stage.canvas, type, { clientX, clientY, ...rest });
   };
-  return { stage, session, send, menus, tools, calls: active.calls, camera: stage.camera };
+  return { stage, session, send, menus, calls: active.calls, camera: stage.camera };
+}
+
+/** Returns the fields of the events of a finger. */
+function finger(pointerId) {
+  return { pointerId, pointerType: "touch" };
 }
 
 test("the tool receives the pointer", () => {
@@ -78,7 +81,6 @@ test("Shift and the middle button move the view, the right button turns it", () 
 
 test("two fingers zoom, move and turn the view", () => {
   const { send, calls, camera } = open();
-  const finger = (id) => ({ pointerId: id, pointerType: "touch" });
   send("pointerdown", 90, 50, finger(1));
   send("pointerdown", 110, 50, finger(2));
   assert.equal(calls.at(-1), "cancel", "the second finger ends the action of the tool");
@@ -95,14 +97,10 @@ test("two fingers zoom, move and turn the view", () => {
 
 test("a movement of two fingers moves the view", () => {
   const { send, camera } = open();
-  for (const [id, x] of [
-    [1, 90],
-    [2, 110],
-  ]) {
-    send("pointerdown", x, 50, { pointerId: id, pointerType: "touch" });
-  }
-  send("pointermove", 90, 30, { pointerId: 1, pointerType: "touch" });
-  send("pointermove", 110, 30, { pointerId: 2, pointerType: "touch" });
+  send("pointerdown", 90, 50, finger(1));
+  send("pointerdown", 110, 50, finger(2));
+  send("pointermove", 90, 30, finger(1));
+  send("pointermove", 110, 30, finger(2));
   assert.deepEqual(camera.toScreen(0, 0).map(Math.round), [100, 30]);
 });
 

@@ -1,17 +1,14 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { SelectTool } from "../../../flatland/web/page/js/tools/select_tool.js";
-import { openPage, settle } from "../fake_page.js";
-import { createStage, showRoom, spotAt } from "../fake_server.js";
+import { settle } from "../fake_page.js";
+import { openRoom, spotAt } from "../fake_server.js";
 
 function open(t, options) {
   t.mock.timers.enable({ apis: ["setInterval"] });
-  openPage();
-  const { connection, session, world } = showRoom(options);
-  const stage = createStage(session);
-  const tool = new SelectTool(session, stage);
-  const at = (x, y, isTouch) => spotAt(stage, x, y, isTouch);
-  return { connection, session, world, tool, stage, at };
+  const room = openRoom(options);
+  const at = (x, y, isTouch) => spotAt(room.stage, x, y, isTouch);
+  return { ...room, tool: new SelectTool(room.session, room.stage), at };
 }
 
 function click(tool, spot) {
@@ -65,28 +62,21 @@ test("the ring around the selected model turns it", async (t) => {
   tool.up(at(2, -2 + radius), true);
   await settle();
   const [{ pose }] = connection.take("move");
-  assert.deepEqual(
-    pose.map((part) => part.toFixed(4)),
-    ["2.0000", "-2.0000", "1.5708"],
-  );
+  assert.equal(pose.map((part) => part.toFixed(4)).join(" "), "2.0000 -2.0000 1.5708");
 });
 
 test("a model that is dropped while another one settles is shown until it settles itself", async (t) => {
   const { connection, tool, at } = open(t);
   let finish;
-  const answered = new Promise((resolve) => {
+  connection.replies.move = new Promise((resolve) => {
     finish = resolve;
   });
-  connection.replies.move = answered;
-  for (const [x, y] of [
-    [2, -2],
-    [-2, 1],
-  ]) {
-    tool.down(at(x, y));
+  for (const spot of [at(2, -2), at(-2, 1)]) {
+    tool.down(spot);
     tool.drag(at(0, 0));
     tool.up(at(0, 0), true);
     await settle();
-    if (x === 2) connection.replies.move = new Promise(() => {});
+    connection.replies.move = new Promise(() => {});
   }
   finish();
   await settle();

@@ -1,23 +1,21 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { SpawnTool } from "../../../flatland/web/page/js/tools/spawn_tool.js";
-import { openPage, settle } from "../fake_page.js";
-import { createStage, showRoom, spotAt } from "../fake_server.js";
+import { settle } from "../fake_page.js";
+import { openRoom, spotAt } from "../fake_server.js";
 
 function open(t) {
   let now = 0;
   t.mock.method(performance, "now", () => now);
-  openPage();
-  const { connection, session } = showRoom();
-  const stage = createStage(session);
-  const tool = new SpawnTool(session, stage);
+  const room = openRoom();
+  const tool = new SpawnTool(room.session, room.stage);
   let done = 0;
   tool.onDone = () => done++;
   tool.begin({ file: "crate.yaml", nextName: () => "crate1", namespace: "", bodies: [] });
   const wait = (time) => {
     now += time;
   };
-  return { connection, session, tool, wait, at: (x, y) => spotAt(stage, x, y), done: () => done };
+  return { ...room, tool, wait, at: (x, y) => spotAt(room.stage, x, y), done: () => done };
 }
 
 function click(tool, spot) {
@@ -26,9 +24,7 @@ function click(tool, spot) {
 }
 
 test("a click sets the position, another one the heading", async (t) => {
-  const { connection, session, tool, at, wait, done } = open(t);
-  const notices = [];
-  session.on("notice", ({ text }) => notices.push(text));
+  const { connection, session, notices, tool, at, wait, done } = open(t);
   tool.hover(at(1, 1));
   assert.deepEqual(tool.pose, [1, 1, 0]);
   assert.equal(tool.hint, "crate1: click or Enter sets the position, Escape cancels");

@@ -2,13 +2,12 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Drive } from "../../../flatland/web/page/js/tools/drive.js";
 import { createStick } from "../../../flatland/web/page/js/tools/stick.js";
-import { dispatch, openPage } from "../fake_page.js";
-import { showRoom } from "../fake_server.js";
+import { dispatch } from "../fake_page.js";
+import { openRoom } from "../fake_server.js";
 
 function open(t) {
   t.mock.timers.enable({ apis: ["setInterval"] });
-  const elements = openPage();
-  const { connection, session } = showRoom();
+  const { elements, connection, session } = openRoom();
   const drive = new Drive(session);
   createStick(session, drive);
   const send = (type, clientX, clientY, pointerId = 1) =>

@@ -5,12 +5,8 @@ import { PanTool } from "../../../flatland/web/page/js/tools/pan_tool.js";
 import { ToolBox } from "../../../flatland/web/page/js/tools/tool_box.js";
 
 function open() {
-  const tools = new ToolBox({
-    select: new PanTool(),
-    pan: new PanTool(),
-    measure: new MeasureTool({ invalidate() {} }),
-    spawn: new PanTool(),
-  });
+  const measure = new MeasureTool({ invalidate() {} });
+  const tools = new ToolBox({ select: new PanTool(), pan: new PanTool(), measure });
   const events = [];
   for (const name of ["change", "hint"]) tools.on(name, (value) => events.push(`${name}: ${value}`));
   return { tools, events };

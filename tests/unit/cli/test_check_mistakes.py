@@ -19,7 +19,6 @@ BODY = "{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}"
 MODEL = f"bodies: [{BODY}]\n"
 LASER = "{type: Laser, name: %s, body: base, range: 5, angle: {min: 0, max: 1, increment: 1}%s}"
 DRIVE = "{type: DiffDrive, name: drive, body: base%s}"
-TF = "{type: ModelTfPublisher, name: tf%s}"
 ROBOT = "models:\n- {name: r, model: robot.yaml, pose: %s}\n"
 
 
@@ -52,14 +51,6 @@ def of_model(text: str, *problems: tuple[str, int | None, str, str]) -> Mistake:
     return Mistake({"robot.yaml": text}, list(problems))
 
 
-def image_map(image: str, hint: str) -> Mistake:
-    """Returns a map whose image cannot be read."""
-    problem = ("map.yaml", 1, 'Failed to load "{folder}/', hint)
-    text = WORLD.replace("room.yaml", "map.yaml")
-    return of_world(text, problem, map=IMAGE_MAP % (image, 0.05))
-
-
-WORLD_EXPECTED = "a world file is expected here"
 MISTAKES: dict[str, Mistake] = {
     # Entries that are incomplete: no errors that follow from them.
     "plugin without a type": of_model(
@@ -94,12 +85,7 @@ MISTAKES: dict[str, Mistake] = {
     ),
     "second layer without a dash": of_world(
         "properties: {}\nlayers:\n- name: room\n  map: room.yaml\n  name: second\n",
-        (
-            "world.yaml",
-            5,
-            '~Duplicate key "name" ignored, the value in line 3 is used',
-            'the next item of a list starts with a dash, "- "',
-        ),
+        ("world.yaml", 5, '~Duplicate key "name" ignored, the', "the next item of a list starts"),
     ),
     "layer without a name": of_world(
         f"properties: {{}}\nlayers: [{{map: room.yaml}}]\n{ROBOT % '[1, 1, 0]'}",
@@ -111,12 +97,7 @@ MISTAKES: dict[str, Mistake] = {
         f"- {{name: [room, attic], map: rom.yaml}}\n{ROBOT % '[1, 1, 0]'}",
         ("world.yaml", 4, 'Layer with name "room" already exists', ""),
         ("world.yaml", 4, "File does not exist", 'did you mean "room.yaml"?'),
-        (
-            "robot.yaml",
-            1,
-            'Invalid footprint "layers" in model "r"',
-            "layers of the world: room, attic",
-        ),
+        ("robot.yaml", 1, 'Invalid footprint "layers" in', "layers of the world: room, attic"),
         robot=MODEL.replace("density: 1", "density: 1, layers: [attic, cellar]"),
     ),
     "two bodies with errors": of_model(
@@ -125,13 +106,16 @@ MISTAKES: dict[str, Mistake] = {
         ("robot.yaml", 3, 'Entry "footprints" must be a list', ""),
     ),
     # Files.
-    "missing image": image_map("roon.png", 'the file does not exist; did you mean "room.png"?'),
-    "missing image without a similar one": image_map("floor.png", "the file does not exist"),
-    "image that is a pointer of Git LFS": image_map("lfs.png", "the file is a pointer of Git LFS"),
-    "truncated image": image_map("cut.png", "the image is truncated after 60 bytes"),
-    "empty image": image_map("empty.png", "the file is empty"),
-    "image that is a text": image_map("room.dat", "the file is not an image"),
-    "image that is a folder": image_map("folder", "the file cannot be read: it is not a regular"),
+    "missing image": of_world(
+        WORLD.replace("room.yaml", "map.yaml"),
+        (
+            "map.yaml",
+            1,
+            'Failed to load "{folder}/',
+            'the file does not exist; did you mean "room.',
+        ),
+        map=IMAGE_MAP % ("roon.png", 0.05),
+    ),
     "map file that is a pointer of Git LFS": of_world(
         WORLD.replace("room.yaml", "lfs.png"),
         ("lfs.png", 1, 'Entry must be a map (in layer "room")', "the file is a pointer of Git LFS"),
@@ -160,21 +144,11 @@ MISTAKES: dict[str, Mistake] = {
     ),
     "path with backslashes": of_world(
         WORLD.replace("room.yaml", "folder\\..\\room.yaml"),
-        (
-            "world.yaml",
-            2,
-            "File does not exist",
-            'the parts of a path are separated by /, not by \\: "{folder}/room.yaml"',
-        ),
+        ("world.yaml", 2, "File does not exist", "the parts of a path are separated by /, not by"),
     ),
     "image in place of a map": of_world(
         WORLD.replace("room.yaml", "room.png"),
-        (
-            "world.yaml",
-            2,
-            'Malformatted file, path="{folder}/room.png", line 1 col 1, byte 0x89',
-            'this is an image; a map file is expected here: "other.yaml", beside the image',
-        ),
+        ("world.yaml", 2, "Malformatted", 'this is an image; a map file is expected here: "other'),
         other=IMAGE_MAP % ("room.png", 0.05),
     ),
     "image in place of a map without a map file": of_world(
@@ -187,24 +161,12 @@ MISTAKES: dict[str, Mistake] = {
     ),
     "world in place of a model": of_world(
         f"{WORLD}models: [{{name: r, model: other.yaml}}]\n",
-        (
-            "other.yaml",
-            1,
-            'Entry "bodies" does not exist (in model "r")',
-            "this is a world file; a model file is expected here",
-        ),
+        ("other.yaml", 1, 'Entry "bodies" does not exist', "this is a world file; a model file is"),
         other=f"{WORLD}models: []\n",
     ),
     "map in place of a world": Mistake(
         {"map.yaml": LINES},
-        [
-            (
-                "map.yaml",
-                1,
-                'Entry "properties" does not exist',
-                f"this is a map file; {WORLD_EXPECTED}",
-            )
-        ],
+        [("map.yaml", 1, 'Entry "properties" does not exist', "this is a map file; a world file")],
     ),
     "model in place of a map": of_world(
         WORLD.replace("room.yaml", "robot.yaml"),
@@ -235,12 +197,7 @@ MISTAKES: dict[str, Mistake] = {
     "pixels of 4 m": of_world(
         WORLD.replace("room.yaml", "map.yaml") + ROBOT % "[-9, 1, 0]",
         ("map.yaml", 2, '~"resolution" is 4 m per pixel; 0.05 is usual', ""),
-        (
-            "world.yaml",
-            4,
-            '~model "r" at (-9, 1) is outside of all walls, which extend from (0, 0',
-            "",
-        ),
+        ("world.yaml", 4, '~model "r" at (-9, 1) is outside of all walls, which extend from', ""),
         map=IMAGE_MAP % ("room.png", 4),
         robot=MODEL,
     ),
@@ -267,31 +224,10 @@ MISTAKES: dict[str, Mistake] = {
         MODEL.replace("radius: 0.2", "radius: 0").replace(
             "base,", "base, color: [255, 0, 0, 255],"
         ),
-        (
-            "robot.yaml",
-            1,
-            '~"color" is [255, 0, 0, 255], but each of [r, g, b, a] is from 0 to 1',
-            "",
-        ),
+        ("robot.yaml", 1, '~"color" is [255, 0, 0, 255], but each of [r, g, b, a] is from', ""),
         ("robot.yaml", 1, '~"radius" is 0, so that the circle is a point', ""),
     ),
     # Conflicts of plugins.
-    "a frame with two parents": of_model(
-        plugins(DRIVE % "", TF % ", publish_tf_world: true"),
-        ("robot.yaml", 4, '~TF frame "base" has two parents, "odom" from Model Plugin "drive"', ""),
-    ),
-    "two lasers of one frame": of_model(
-        plugins(
-            LASER % ("a", ", frame: eye"),
-            LASER % ("b", ", frame: eye, topic: b, origin: [0.1, 0, 0]"),
-        ),
-        (
-            "robot.yaml",
-            4,
-            '~TF frame "eye" is sent with two poses in "base", by Model Plugin "a"',
-            "",
-        ),
-    ),
     "two lasers of one frame without transforms": of_model(
         plugins(
             LASER % ("a", ", frame: eye, broadcast_tf: false"),
@@ -323,7 +259,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     pixels[2:18, 2:18] = 255
     for name in ("room.png", "plain.png"):
         Image.fromarray(pixels).save(tmp_path / name)
-    (tmp_path / "cut.png").write_bytes((tmp_path / "room.png").read_bytes()[:60])
     (tmp_path / "empty.png").touch()
     (tmp_path / "lfs.png").write_text("version https://git-lfs.example/spec/v1\noid sha256:1\n")
     (tmp_path / "room.dat").write_text("0 0 6 0\n6 0 6 6\n6 6 0 6\n0 6 0 0\n")

@@ -57,12 +57,13 @@ def test_without_any_package_everything_has_a_remedy(bare_python, checkout, tmp_
     assert lines[lines.index("  missing  numpy: not installed") + 1] == (
         "           -> apt-get install python3-numpy"
     )
-    assert any(line.startswith("  absent   rospy: not installed") for line in lines)
-    assert any(line.startswith("  absent   command flatland: not on PATH") for line in lines)
-    assert any(line.startswith("  absent   display: DISPLAY is not set") for line in lines)
-    assert any(
-        line.startswith("  info     ROS master: ROS_MASTER_URI is not set") for line in lines
-    )
+    for start in (
+        "absent   rospy: not installed",
+        "absent   command flatland: not on PATH",
+        "absent   display: DISPLAY is not set",
+        "info     ROS master: ROS_MASTER_URI is not set",
+    ):
+        assert any(line.startswith(f"  {start}") for line in lines), start
     assert lines[-1].startswith("required and missing: numpy, PyYAML, lupa")
 
 

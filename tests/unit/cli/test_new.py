@@ -6,7 +6,6 @@ import re
 import sys
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import Any
 
 import pytest
 from flatland_command import main
@@ -23,7 +22,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_robot(capsys: Any) -> None:
+def test_robot(capsys):
     assert main("new", "robot", "rover_2") == 0
     assert capsys.readouterr().out.splitlines()[0] == "created rover_2.model.yaml"
     assert main("check", "rover_2.model.yaml") == 0
@@ -37,7 +36,7 @@ def test_robot(capsys: Any) -> None:
         assert len(scan.latest.ranges) > 100
 
 
-def test_world(folder: Path, capsys: Any) -> None:
+def test_world(folder, capsys):
     assert main("new", "world", "arena") == 0
     assert sorted(path.name for path in Path("arena").iterdir()) == [
         "map.pgm", "map.yaml", "robot.model.yaml", "world.yaml"
@@ -52,7 +51,7 @@ def test_world(folder: Path, capsys: Any) -> None:
     assert [path.name for path in folder.iterdir()] == ["arena"]
 
 
-def test_the_test_of_a_plugin_passes() -> None:
+def test_the_test_of_a_plugin_passes():
     assert main("new", "plugin", "speed_meter") == 0
     # Without bytecode, which Python reuses if a file changes within a second.
     done = run_program(
@@ -69,7 +68,7 @@ def test_the_test_of_a_plugin_passes() -> None:
     assert done.returncode == 1
 
 
-def test_a_plugin_is_a_ros_package_with_a_manifest(monkeypatch, capsys) -> None:
+def test_a_plugin_is_a_ros_package_with_a_manifest(monkeypatch, capsys):
     assert main("new", "plugin", "speedy") == 0
     package = ElementTree.parse("speedy/package.xml").getroot()
     assert package.findtext("name") == "speedy"
@@ -80,7 +79,7 @@ def test_a_plugin_is_a_ros_package_with_a_manifest(monkeypatch, capsys) -> None:
     assert main("check", "speedy/worlds/demo.yaml") == 0, capsys.readouterr().out
 
 
-def test_random_world(folder: Path, capsys: Any) -> None:
+def test_random_world(folder, capsys):
     arguments = ("--size", "15x14", "--resolution", "0.1", "--radius", "0.2")
     assert main("new", "world", "lab", "--office", "--seed", "3", *arguments) == 0
     printed = capsys.readouterr().out
@@ -93,7 +92,7 @@ def test_random_world(folder: Path, capsys: Any) -> None:
     assert [path.name for path in folder.iterdir()] == ["lab"]
 
 
-def test_the_seed_of_a_random_world_is_drawn_and_printed(capsys: Any) -> None:
+def test_the_seed_of_a_random_world_is_drawn_and_printed(capsys):
     assert main("new", "world", "one", "--maze", "--size", "8x8") == 0
     found = re.match(r"created one, seed (\d+)\n", capsys.readouterr().out)
     assert found is not None
@@ -105,9 +104,6 @@ def test_the_seed_of_a_random_world_is_drawn_and_printed(capsys: Any) -> None:
     ("arguments", "code", "message"),
     [
         ("world lab --office --size 5x5", 1, "at least 12 x 10 m, got 5 x 5 m"),
-        ("world lab --maze --size 400x400", 1, "at most 40000000 cells"),
-        ("world lab --maze --size 1000x9", 1, "at most 500 m along each side"),
-        ("world lab --maze --radius 2", 1, "radius must be from 0.1 to 0.45 m, got 2"),
         ("world lab --maze --size big", 2, "must be WIDTHxHEIGHT in metres, as in 60x25"),
         ("world lab --maze --seed -1", 2, "must be an integer of at least 0, got '-1'"),
         ("world lab --maze --office", 2, "not allowed with argument --maze"),
@@ -117,9 +113,7 @@ def test_the_seed_of_a_random_world_is_drawn_and_printed(capsys: Any) -> None:
         ("world 2d --maze", 1, "the name must start with a letter"),
     ],
 )
-def test_invalid_random_worlds_leave_nothing_behind(
-    folder: Path, capsys: Any, arguments: str, code: int, message: str
-) -> None:
+def test_invalid_random_worlds_leave_nothing_behind(folder, capsys, arguments, code, message):
     try:
         result = main("new", *arguments.split())
     except SystemExit as error:  # of argparse
@@ -129,14 +123,7 @@ def test_invalid_random_worlds_leave_nothing_behind(
     assert not list(folder.iterdir())
 
 
-def test_a_random_world_changes_no_existing_folder(folder: Path, capsys: Any) -> None:
-    Path("lab").mkdir()
-    assert main("new", "world", "lab", "--maze") == 1
-    assert "lab exists, choose another name" in capsys.readouterr().err
-    assert not list((folder / "lab").iterdir())
-
-
-def test_no_placeholder_is_left(folder: Path) -> None:
+def test_no_placeholder_is_left(folder):
     for kind in ("robot", "world", "plugin"):
         assert main("new", kind, f"my_{kind}") == 0
     files = [path for path in folder.rglob("*") if path.is_file()]
@@ -144,17 +131,17 @@ def test_no_placeholder_is_left(folder: Path) -> None:
     for path in files:
         assert "__name__" not in str(path)
         assert not path.name.endswith(".in")
-        if path.suffix != ".pgm":
-            text = path.read_text().lower()
-            assert "@name@" not in text
+        assert b"@name@" not in path.read_bytes().lower()
 
 
-@pytest.mark.parametrize("kind", ["robot", "world", "plugin"])
-def test_nothing_that_exists_is_changed(folder: Path, capsys: Any, kind: str) -> None:
-    name = "thing.model.yaml" if kind == "robot" else "thing"
+@pytest.mark.parametrize(
+    "arguments", ["robot thing", "world thing", "world thing --maze", "plugin thing"]
+)
+def test_nothing_that_exists_is_changed(folder, capsys, arguments):
+    name = "thing.model.yaml" if arguments.startswith("robot") else "thing"
     Path(name).write_text("mine")
-    assert main("new", kind, "thing") == 1
-    assert "exists, choose another name" in capsys.readouterr().err
+    assert main("new", *arguments.split()) == 1
+    assert f"{name} exists, choose another name" in capsys.readouterr().err
     assert Path(name).read_text() == "mine"
     assert [path.name for path in folder.iterdir()] == [name]
 
@@ -167,13 +154,13 @@ def test_nothing_that_exists_is_changed(folder: Path, capsys: Any, kind: str) ->
         ("plugin", "a-b"),
     ],
 )  # fmt: skip
-def test_an_invalid_name_is_an_error(folder: Path, capsys: Any, kind: str, name: str) -> None:
+def test_an_invalid_name_is_an_error(folder, capsys, kind, name):
     assert main("new", kind, name) == 1
     assert "name" in capsys.readouterr().err
     assert not list(folder.iterdir())
 
 
-def test_another_folder(folder: Path, capsys: Any) -> None:
+def test_another_folder(folder, capsys):
     Path("worlds").mkdir()
     assert main("new", "world", "lab", "--folder", "worlds") == 0
     assert Path("worlds/lab/world.yaml").exists()

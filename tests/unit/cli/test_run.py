@@ -19,19 +19,11 @@ import cv2
 import numpy as np
 import pytest
 from flatland_command import main
+from programs import Program
 from waiting import TIMEOUT, wait_until
 
 import flatland
 from flatland.drawing import FrameRenderer
-
-ROBOT = """
-bodies:
-- {name: base, footprints: [{type: circle, radius: 0.5, density: 1}]}
-plugins:
-- {type: DiffDrive, name: drive, body: base, pub_rate: 20}
-- {type: Laser, name: eye, body: base, range: 9, noise_std_dev: 0.1, update_rate: 10,
-   angle: {min: 0, max: 6, increment: 0.1}}
-"""
 
 
 class Failing(flatland.ModelPlugin):
@@ -40,22 +32,6 @@ class Failing(flatland.ModelPlugin):
     def before_physics_step(self, timekeeper):
         if timekeeper.sim_time >= 0.5:
             raise ValueError("out of fuel")
-
-
-@pytest.fixture
-def robot_world(files: Any, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A room with a robot at (3, 5); its folder is the current one."""
-    files.write_map("room", ["##########", *["#........#"] * 8, "##########"])
-    files.write("robot.model.yaml", ROBOT)
-    monkeypatch.chdir(files.folder)
-    return files.write(
-        "world.yaml",
-        """
-        properties: {}
-        layers: [{name: walls, map: room.yaml}]
-        models: [{name: robot, model: robot.model.yaml, pose: [3, 5, 0]}]
-        """,
-    )
 
 
 def read_bag(path: Path | str) -> dict[str, list[tuple[float, Any]]]:
@@ -117,7 +93,9 @@ class TestSimulation:
     def test_an_exception_of_a_plugin_is_an_error_with_its_time(
         self, robot_world, files, declare_plugins, capsys
     ):
-        add_failing_plugin(files, declare_plugins)
+        declare_plugins(Failing)
+        with (files.folder / "robot.model.yaml").open("a") as model:
+            model.write("- {type: 'test::Failing', name: failing}\n")
         (files.folder / "old.bag").write_text("old")
         arguments = ["--bag", "old.bag", "--video", "new.mp4", "--size", "64x64", "--no-axes"]
         before = set(files.folder.iterdir())
@@ -126,12 +104,6 @@ class TestSimulation:
         assert error.startswith("flatland: stopped at 0.505 s: ValueError: out of fuel")
         assert (files.folder / "old.bag").read_text() == "old"
         assert set(files.folder.iterdir()) - before <= {files.folder / "__pycache__"}
-
-
-def add_failing_plugin(files: Any, declare_plugins: Any) -> None:
-    """Adds a plugin to the robot that raises in the step from 0.5 s on."""
-    declare_plugins(Failing)
-    files.write("robot.model.yaml", ROBOT + "- {type: 'test::Failing', name: failing}\n")
 
 
 class TestCommands:
@@ -204,9 +176,8 @@ class TestBag:
         ],
     )
     def test_invalid_arguments_exit_with_2(self, robot_world, tmp_path, capsys, arguments, message):
-        with pytest.raises(SystemExit) as caught:
+        with pytest.raises(SystemExit, match="2"):
             main("run", robot_world, *arguments)
-        assert caught.value.code == 2
         assert message in capsys.readouterr().err
         assert not [*tmp_path.glob("*.mp4"), *tmp_path.glob("*.bag")]
 
@@ -214,15 +185,12 @@ class TestBag:
 class TestInterruption:
     def test_files_contain_what_was_simulated(self, robot_world, tmp_path):
         command = [sys.executable, "-m", "flatland", "run", robot_world, "--duration", "1e6"]
-        process = subprocess.Popen(
-            [*command, "--bag", "a.bag"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
+        program = Program([*command, "--bag", "a.bag"])
         part = tmp_path / "a.part.bag"
         wait_until("messages", lambda: part.exists() and part.stat().st_size > 100_000)
-        process.send_signal(signal.SIGTERM)
-        out, error = process.communicate(timeout=TIMEOUT)
-        assert process.returncode == 128 + signal.SIGTERM, error
-        end = re.match(r"interrupted after (\S+) s in ", out)
+        program.send(signal.SIGTERM)
+        assert program.wait() == 128 + signal.SIGTERM, program.output
+        end = re.match(r"interrupted after (\S+) s in ", program.stdout)
         assert end
         messages = read_bag(tmp_path / "a.bag")
         assert messages["/tf"][-1][0] == pytest.approx(float(end[1]), abs=0.06)

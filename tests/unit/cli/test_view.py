@@ -5,72 +5,47 @@ from __future__ import annotations
 import re
 import signal
 import socket
-import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
 from flatland_command import main
+from programs import Program
 from raw_web_client import RawWebClient
-from waiting import TIMEOUT, wait_until
+from waiting import wait_until
 
 QUIET = ("--port", "0", "--no-browser")
 
 
 @contextmanager
-def shown(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Starts the command; yields its process and the address that it prints."""
-    command = [sys.executable, "-W", "error", "-m", "flatland", "view", *arguments, *QUIET]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    # Ends the wait for the address if the process does not print it.
-    limit = threading.Timer(TIMEOUT, process.kill)
-    limit.start()
+def shown(*arguments: str) -> Iterator[tuple[Program, str]]:
+    """Starts the command; yields the program and the address that it prints."""
+    program = Program([sys.executable, "-W", "error", "-m", "flatland", "view", *arguments, *QUIET])
     try:
-        assert process.stdout is not None
-        line = process.stdout.readline()
-        limit.cancel()
-        found = re.fullmatch(r"\S+ is shown at (http://\S+)\n", line)
-        if not found:
-            process.kill()
-            pytest.fail(f"no address:\n{line}{''.join(process.communicate())}")
-        yield process, found[1]
+        yield program, program.wait_for_line(r"^\S+ is shown at (http://\S+)$")[1]
     finally:
-        limit.cancel()
-        process.kill()
-        process.communicate(timeout=TIMEOUT)
+        program.kill()
 
 
 def test_the_world_is_shown_until_an_interrupt(world_file):
-    with shown(world_file, "--seed", "1") as (process, url):
+    with shown(world_file, "--seed", "1") as (program, url):
         with RawWebClient(url) as client:
             assert client.wait_model("robot")
             assert client.wait("status", lambda message: message["time"] > 0.2)["rate"] == 200
             assert client.wait("status")["paused"] is False
-            process.send_signal(signal.SIGINT)
+            program.send(signal.SIGINT)
             assert client.wait_closed()[0] == 1001
-        output, errors = process.communicate(timeout=TIMEOUT)
-        assert (process.returncode, output, errors) == (130, "", "")
+        assert program.wait() == 130
+        assert len(program.lines) == 1, program.output
 
 
 def test_the_options(world_file):
-    options = [
-        "--paused",
-        "--rate",
-        "50",
-        "--read-only",
-        "--token",
-        "open the sesame!",
-        "--view-token",
-        "sesame for viewers",
-        "--step-size",
-        "0.01",
-    ]
-    with shown(world_file, *options) as (process, url):
+    options = ["--paused", "--rate", "50", "--read-only", "--step-size", "0.01"]
+    tokens = ("--token", "open the sesame!", "--view-token", "sesame for viewers")
+    with shown(world_file, *options, *tokens) as (program, url):
         assert url.endswith("/?token=open%20the%20sesame%21")
-        line = process.stdout.readline()
-        assert re.fullmatch(r"for viewers: \S+/\?token=sesame%20for%20viewers\n", line)
+        program.wait_for_line(r"^for viewers: \S+/\?token=sesame%20for%20viewers$")
         with RawWebClient(url, look=False) as client:
             assert client.wait("hello")["read_only"]
             client.ask("look", worlds=[0])
@@ -78,10 +53,10 @@ def test_the_options(world_file):
             assert (status["paused"], status["rate"], status["time"]) == (True, 50, 0)
             world = [m for m in client.received if isinstance(m, dict) and m["type"] == "world"]
             assert world[0]["step_size"] == 0.01
-            process.send_signal(signal.SIGTERM)
+            program.send(signal.SIGTERM)
             assert client.wait_closed()[0] == 1001
-        output, errors = process.communicate(timeout=TIMEOUT)
-        assert (process.returncode, output, errors) == (143, "", "")
+        assert program.wait() == 143
+        assert len(program.lines) == 2, program.output
 
 
 def test_it_ends_after_the_duration(world_file, capsys):
@@ -137,7 +112,6 @@ def test_an_invalid_world_is_an_error(capsys):
     ],
 )
 def test_invalid_options_are_errors(world_file, capsys, option, error):
-    with pytest.raises(SystemExit) as exit_code:
+    with pytest.raises(SystemExit, match="2"):
         main("view", world_file, *option)
-    assert exit_code.value.code == 2
     assert error in capsys.readouterr().err

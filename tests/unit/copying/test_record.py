@@ -12,7 +12,6 @@ import pytest
 
 from flatland.copying.kinds import UncopyableError
 from flatland.copying.record import SavedObjects
-from flatland.physics import restore_contents
 
 
 class Derived(list[Any]):
@@ -104,30 +103,3 @@ def test_only_contents_that_are_other_objects_are_written() -> None:
     saved.write_back()
     assert slotted.first == 1.0
     assert vars(holder) == {"parts": (), "array": None}
-
-
-def test_restore_contents_writes_attributes_and_names_containers() -> None:
-    missing, value = object(), [1.0]
-    items, holder = [value, value], Holder((), value)
-    members = (Slotted.first, Slotted.second)  # type: ignore[attr-defined]
-    slotted = Slotted()
-    slotted.first = value
-    entries = [
-        (items, None, (), (), [], [value, value]),
-        (holder, {"parts": (), "array": value}, ("ignored",), (), [], None),
-        (slotted, None, (), members, [value, missing], None),
-    ]
-    assert restore_contents(entries, missing) == []
-    items[1] = [1.0]
-    holder.extra = holder.ignored = 1  # type: ignore[attr-defined]
-    del holder.array
-    slotted.first, slotted.second = None, 2
-    assert restore_contents(entries, missing) == [0]
-    assert vars(holder) == {"parts": (), "array": value, "ignored": 1}
-    assert holder.array is value
-    assert slotted.first is value
-    assert not hasattr(slotted, "second")
-    items[1] = value
-    assert restore_contents(entries, missing) == []
-    with pytest.raises(ValueError, match="an entry must have 6 members"):
-        restore_contents([(items, None)], missing)

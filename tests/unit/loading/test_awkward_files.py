@@ -84,30 +84,17 @@ def test_awkward_files_load_as_in_the_reference(files, caplog, start, line_end):
 
 
 def test_a_topic_of_two_types_is_an_error_that_names_both_plugins(files):
-    files.write(
-        "driver.model.yaml",
-        """
-        bodies: [{name: base, footprints: []}]
-        plugins: [{type: DiffDrive, name: drive, body: base, odom_pub: /state/}]
-        """,
-    )
-    files.write(
-        "seer.model.yaml",
-        """
-        bodies: [{name: base, footprints: []}]
-        plugins: [{type: Bumper, name: bumper, topic: //state}]
-        """,
-    )
     with pytest.raises(flatland.PluginError) as caught:
-        files.load(
+        files.load_model(
             """
-            properties: {}
-            layers: []
-            models: [{name: a, model: driver.model.yaml}, {name: b, model: seer.model.yaml}]
+            bodies: [{name: base, footprints: []}]
+            plugins:
+              - {type: DiffDrive, name: drive, body: base, odom_pub: /state/}
+              - {type: Bumper, name: bumper, topic: //state}
             """
         )
     assert str(caught.value) == (
-        'Flatland plugin: Model Plugin "bumper" type "Bumper" model "b": topic "/state" already '
-        'carries Odometry, used by Model Plugin "drive" type "DiffDrive" model "a", not Collisions '
-        f"[{files.folder}/seer.model.yaml:3]"
+        'Flatland plugin: Model Plugin "bumper" type "Bumper" model "robot": topic "/state" already'
+        ' carries Odometry, used by Model Plugin "drive" type "DiffDrive" model "robot", not '
+        f"Collisions [{files.folder}/robot.model.yaml:5]"
     )

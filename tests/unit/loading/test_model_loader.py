@@ -40,6 +40,7 @@ def test_entries_of_a_body(files):
               - {type: circle, radius: 0.5, center: [0.1, 0.2], density: 3, friction: 0.4,
                  restitution: 0.6, layers: [3d], sensor: true}
               - {type: polygon, points: [[0, 0], [1, 0], [1, 1]], density: 0, collision: false}
+              - {type: circle, radius: 1, density: 1, layers: []}
           - {name: plain, footprints: []}
         """
     )
@@ -52,7 +53,7 @@ def test_entries_of_a_body(files):
     assert base.linear_damping == pytest.approx(0.1)
     assert base.angular_damping == pytest.approx(0.2)
     assert plain.fixtures == []
-    circle, polygon = base.fixtures
+    circle, polygon, disc = base.fixtures
     assert circle.shape == "circle"
     assert circle.radius == pytest.approx(0.5)
     assert circle.center == pytest.approx((0.1, 0.2))
@@ -65,18 +66,7 @@ def test_entries_of_a_body(files):
     assert sorted(map(tuple, polygon.vertices.tolist())) == [(0, 0), (1, 0), (1, 1)]
     assert (polygon.friction, polygon.restitution, polygon.is_sensor) == (0, 0, False)
     assert (polygon.category_bits, polygon.mask_bits) == (0xFFFF, 0)
-
-
-def test_a_circle_is_centered_by_default(files):
-    world = files.load_model(body(footprint="type: circle, radius: 1, density: 1"))
-    (fixture,) = world.model("robot").body("base").fixtures
-    assert fixture.center == (0, 0)
-
-
-def test_a_footprint_without_layers_has_no_category_bits(files):
-    world = files.load_model(body(footprint="type: circle, radius: 1, density: 1, layers: []"))
-    (fixture,) = world.model("robot").body("base").fixtures
-    assert (fixture.category_bits, fixture.mask_bits) == (0, 0)
+    assert (disc.center, disc.category_bits, disc.mask_bits) == ((0, 0), 0, 0)
 
 
 def test_the_pose_of_a_body_is_relative_to_the_model(files):
@@ -118,12 +108,6 @@ joints:
     assert fixed.damping == pytest.approx(0.7)
     assert (rigid.reference_angle, rigid.frequency, rigid.damping) == (0, 0, 0)
     assert (rigid.collide_connected, rigid.color) == (False, (1, 1, 1, 0.5))
-
-
-def test_the_ends_of_a_joint_can_have_other_keys(files):
-    end = "bodies: [{name: base, anchor: [0, 0], side: left}, {name: wheel, anchor: [0, 0], n: []}]"
-    world = files.load_model(joint(f"type: weld, {end}"))
-    assert [body.name for body in world.model("robot").joint("J").bodies] == ["base", "wheel"]
 
 
 def test_disabled_entries_are_skipped_and_logged(files, caplog):

@@ -35,11 +35,6 @@ def test_a_copy_is_independent() -> None:
     assert copy.inputs is not source.inputs
 
 
-def test_a_world_without_a_file_publishes_no_map() -> None:
-    with flatland.World(seed=1) as world:
-        assert world.map_layer == ""
-
-
 MODEL = "bodies: [{name: base, footprints: [$include shape.yaml, $include shape.yaml]}]\n"
 SHAPE = "{type: circle, radius: $eval math.random(), density: 1}\n"
 MAP = "type: line_segments\ndata: walls.dat\nscale: 1.0\norigin: [0, 0, 0]\n"

@@ -20,14 +20,23 @@ from flatland.web.foreign_topics import TopicDemand, TopicUpdate
 
 
 class FakeTopic:
-    """A topic whose subscriber is the test.
+    """A topic whose subscriber is the test; also a subscription or a service.
 
     Attributes:
         sent: The published values.
+        options: With what it was opened.
     """
 
-    def __init__(self, name: str, make: Any, post: Any, on_connection: Any) -> None:
+    def __init__(
+        self,
+        name: str,
+        make: Any = None,
+        post: Any = None,
+        on_connection: Any = None,
+        **options: Any,
+    ) -> None:
         self.topic = name
+        self.options = options
         self.connected = False
         self.sent: list[Any] = []
         self.closed = False
@@ -40,6 +49,11 @@ class FakeTopic:
             self._on_connection(True)
         if self._make is not None:
             self._post(lambda: self.sent.append(self._make()))
+
+    def disconnect(self) -> None:
+        """Removes the subscriber."""
+        self.connected = False
+        self._on_connection(False)
 
     def send(self) -> None:
         if self.connected:
@@ -77,10 +91,13 @@ class FakeTransport(Transport):
     Attributes:
         topics: Published topics by name.
         callbacks: Callbacks of subscriptions by name of the topic.
+        subscriptions: All subscriptions, in their order.
         services: Handlers by name of the service.
         parameters: Parameters by name.
         lost: Messages that were dropped, by topic and subscriber.
         is_delayed: Whether the system may delay small messages.
+        registers: Whether registrations are complete in time.
+        flushed: Limits of the waits for registrations [s].
         foreign_topics: Topics of other nodes for the viewer in the browser.
     """
 
@@ -88,13 +105,16 @@ class FakeTransport(Transport):
     node_name = "/flatland_server"
     shutting_down = False
     is_delayed = True
+    registers = True
 
     def __init__(self) -> None:
         self.topics: dict[str, FakeTopic] = {}
         self.callbacks: dict[str, Callable[[Any], object]] = {}
+        self.subscriptions: list[FakeTopic] = []
         self.services: dict[str, Callable[[Any], Any]] = {}
         self.parameters: dict[str, object] = {}
         self.lost: Counter[tuple[str, str]] = Counter()
+        self.flushed: list[float] = []
         self.time_ns = 0
         self.foreign_topics = FakeForeignTopics()
 
@@ -107,12 +127,12 @@ class FakeTransport(Transport):
     def writer(self) -> Any:
         raise NotImplementedError
 
-    def _add(self, topic: str, make: Any = None, post: Any = None, change: Any = None) -> FakeTopic:
-        self.topics[topic] = FakeTopic(topic, make, post, change)
+    def _add(self, topic: str, *arguments: Any, **options: Any) -> FakeTopic:
+        self.topics[topic] = FakeTopic(topic, *arguments, **options)
         return self.topics[topic]
 
     def advertise(self, topic: str, message_type: type[Any], **options: Any) -> FakeTopic:
-        return self._add(topic, change=options.get("on_connection"))
+        return self._add(topic, type=message_type, **options)
 
     def advertise_state(
         self, topic: str, message_type: Any, make: Any, post: Any, on_connection: Any = None
@@ -121,11 +141,12 @@ class FakeTransport(Transport):
 
     def subscribe(self, topic: str, message_type: Any, callback: Any, **options: Any) -> FakeTopic:
         self.callbacks[topic] = callback
-        return FakeTopic(topic, None, None, None)
+        self.subscriptions.append(FakeTopic(topic, type=message_type, **options))
+        return self.subscriptions[-1]
 
     def serve(self, name: str, service_type: Any, handler: Any, **options: Any) -> FakeTopic:
         self.services[name] = handler
-        return FakeTopic(name, None, None, None)
+        return FakeTopic(name, type=service_type, **options)
 
     def call(self, service: str, **fields: Any) -> SimpleNamespace:
         """Calls a service."""
@@ -144,7 +165,8 @@ class FakeTransport(Transport):
         self.parameters[name] = value
 
     def flush(self, timeout: float) -> bool:
-        return True
+        self.flushed.append(timeout)
+        return self.registers
 
     def is_connected(self, topic: str) -> bool:
         return self.topics[topic].connected

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 import flatland
 from flatland.node.bridge import Bridge
 from flatland.node.clock import SimulatedClock
+from flatland.node.transport import Adapter
 
 STEP_NS = 5_000_000
 ROBOT = """
@@ -31,14 +33,25 @@ def step(node: Any, duration: float) -> None:
     assert node.call("step_world", duration=duration).success
 
 
-def test_a_value_is_published_while_its_topic_has_a_subscriber(node: Any) -> None:
-    scans = node.transport.topics["scan"]
+def test_a_value_is_converted_and_published_while_its_topic_has_a_subscriber(
+    files: Any, serve: Any, transport: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    converted: list[object] = []
+    adapter = Adapter(
+        flatland.LaserScan, flatland.LaserScan, lambda value: converted.append(value) or value, None
+    )
+    find = transport.find_adapter
+    monkeypatch.setattr(
+        transport,
+        "find_adapter",
+        lambda kind: adapter if kind is flatland.LaserScan else find(kind),
+    )
+    files.write("robot.model.yaml", ROBOT)
+    node = serve(WORLD, lockstep=True)
+    scans = transport.topics["scan"]
     # A part of the program wants the output, so that it is computed without a subscriber.
     values: list[flatland.LaserScan] = []
     node.run(lambda: node.world.output("/scan").subscribe(values.append))
-    converted: list[object] = []
-    topic = node.served._bridge._outputs[node.world.output("/scan")]
-    topic._convert = lambda value: converted.append(value) or value
     step(node, 0.02)
     assert len(values) == 2
     assert converted == scans.sent == []
@@ -52,14 +65,15 @@ def test_a_value_is_published_while_its_topic_has_a_subscriber(node: Any) -> Non
 
 
 def test_an_output_without_a_subscriber_is_not_computed(node: Any) -> None:
-    scans = node.transport.topics["scan"]
-    output, bridge = node.world.ports.find_output("/scan"), node.served._bridge
+    scans, output = node.transport.topics["scan"], node.world.ports.find_output("/scan")
     step(node, 0.02)
-    assert not bridge.subscribed(output)
+    assert output.latest is None
     scans.connect()
-    assert bridge.subscribed(output)
     step(node, 0.02)
     assert [scan.stamp for scan in scans.sent] == [4 * STEP_NS, 6 * STEP_NS]
+    scans.disconnect()
+    step(node, 0.02)
+    assert output.latest == scans.sent[-1]
 
 
 def test_ports_without_an_adapter_are_named(
@@ -124,66 +138,22 @@ def test_a_model_that_returns_has_topics_of_its_own(files: Any, transport: Any) 
     assert before.sent == []
 
 
-def test_messages_between_two_steps_are_published_at_once(files: Any, transport: Any) -> None:
-    bridge = Bridge(transport, SimulatedClock(transport))
-    published: list[str] = []
-    bridge._send(published.append, "without a world")
-    with pytest.raises(RuntimeError, match="the bridge is not attached to a world"):
-        bridge._post(lambda: None)
-    plugin: Any = None
-    with pytest.raises(RuntimeError, match="the bridge is not attached to a world"):
-        bridge.plugin_ros(plugin)
-    world = files.load_model(ROBOT, observers=[bridge])
-    bridge.step_started()
-    bridge._send(published.append, "in a step")
-    assert published == ["without a world"]
-    bridge.step_finished()
-    assert published == ["without a world", "in a step"]
-    bridge._send(published.append, "after it")
-    assert published[2:] == ["after it"]
-    bridge.step_finished()
-    assert published[3:] == []
-    # What a plugin is given.
-    (plugin, *_) = world.model("robot").plugins
-    access = bridge.plugin_ros(plugin)
-    assert access._plugin is plugin
-    assert access._transport is transport
-    assert access._requests is world.requests
-    assert access._post == bridge._post
-    assert not access._shutting_down()
-    bridge.close()
-    assert access._shutting_down()
-
-
-def test_the_subscription_of_a_command_ends_with_its_model(
-    files: Any, transport: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    subscribers: list[Any] = []
-    subscribe = transport.subscribe
-
-    def record(*arguments: Any, **options: Any) -> Any:
-        subscribers.append(subscribe(*arguments, **options))
-        return subscribers[-1]
-
-    monkeypatch.setattr(transport, "subscribe", record)
+def test_the_subscription_of_a_command_ends_with_its_model(files: Any, transport: Any) -> None:
     for ends in (True, False):
+        transport.subscriptions.clear()
         bridge = Bridge(transport, SimulatedClock(transport))
         world = files.load_model(ROBOT, observers=[bridge])
         if not ends:
             bridge.close()
         world.delete_model("robot")
-        assert [each.closed for each in subscribers] == [ends]
-        subscribers.clear()
+        assert [(each.topic, each.closed) for each in transport.subscriptions] == [
+            ("cmd_vel", ends)
+        ]
 
 
-def test_a_failing_topic_is_named_with_its_adapter(files: Any, transport: Any) -> None:
+def test_a_bridge_needs_a_world(transport: Any) -> None:
     bridge = Bridge(transport, SimulatedClock(transport))
-    world = files.load_model(ROBOT, observers=[bridge])
-    topic = bridge._outputs[world.output("/scan")]
-
-    def convert(value: Any) -> Any:
-        return value
-
-    topic._convert = convert
-    name = f"{__name__}.{convert.__qualname__}"
-    assert repr(topic) == f'ROS topic "scan" (adapter {name})'
+    value: Any = None
+    for method in (partial(bridge.command_received, value), bridge.plugin_ros):
+        with pytest.raises(RuntimeError, match="the bridge is not attached to a world"):
+            method(value)

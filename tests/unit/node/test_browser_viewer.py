@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import re
 import socket
+import threading
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,9 +14,15 @@ from free_ports import free_port
 from waiting import wait_until
 from web_client import WebClient
 
+import flatland
 from flatland import web
 from flatland.errors import FlatlandError
 from flatland.node import browser_viewer
+from flatland.node.clock import SimulatedClock
+from flatland.node.operations import Operations
+from flatland.node.parameters import read_parameters
+from flatland.node.transport import REGISTRATION_TIMEOUT
+from flatland.simulation import Simulation
 
 
 def url_of_the_page(caplog: pytest.LogCaptureFixture) -> str:
@@ -51,138 +58,102 @@ def test_a_port_that_becomes_free_is_used(
     serve: Any, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As when the node that had the port ends, because this one has taken its name."""
-    tries = []
-    wait = browser_viewer.BrowserViewer._listen
+    threads = []
+    start = web.WebViewer.start
     port = free_port()
     taken = socket.create_server(("127.0.0.1", port))
 
-    def listen(self: Any, viewer: Any) -> None:
-        start = viewer.start
+    def start_and_release(viewer: Any) -> None:
+        threads.append(threading.current_thread())
+        if len(threads) == 2:
+            taken.close()
+        start(viewer)
 
-        def start_and_release() -> None:
-            tries.append(viewer)
-            if len(tries) == 2:
-                taken.close()
-            start()
-
-        viewer.start = start_and_release
-        wait(self, viewer)
-
-    monkeypatch.setattr(browser_viewer.BrowserViewer, "_listen", listen)
+    monkeypatch.setattr(web.WebViewer, "start", start_and_release)
     serve(web=True, web_port=port)
     assert url_of_the_page(caplog) == f"http://127.0.0.1:{port}/"
-    assert len(tries) == 2
-
-
-class Viewer:
-    """A server that records its calls."""
-
-    url, view_url = "url", None
-
-    def __init__(self, calls: list[Any], *arguments: Any, **options: Any) -> None:
-        self._calls = calls
-        calls.append(("create", arguments, options))
-
-    def add_world(self, *arguments: Any, **options: Any) -> None:
-        self._calls.append(("world", arguments, options))
-
-    def start(self) -> None:
-        self._calls.append("start")
-
-    def close(self) -> None:
-        self._calls.append("close")
+    assert [(each.name, each.daemon) for each in threads] == [("flatland-web-start", True)] * 2
 
 
 @pytest.fixture
-def wired(monkeypatch: pytest.MonkeyPatch, transport: Any) -> tuple[Any, Any, list[Any]]:
-    """A viewer that the test starts, its simulation, and the calls of its server."""
-    calls: list[Any] = []
-    monkeypatch.setattr(web, "WebViewer", lambda *args, **options: Viewer(calls, *args, **options))
-    posted: list[Any] = []
-    simulation: Any = SimpleNamespace(world="world", post=posted.append, posted=posted)
-    parameters: Any = SimpleNamespace(
-        web_host="host", web_port=7, web_token="t", web_view_token="v", web_read_only=True
+def viewer(
+    empty_world: flatland.World, transport: Any, monkeypatch: pytest.MonkeyPatch
+) -> browser_viewer.BrowserViewer:
+    """A viewer that the test starts."""
+    simulation = Simulation(empty_world)
+    # The end of the world would start it once more.
+    monkeypatch.setattr(simulation, "post", lambda _action: None)
+    clock = SimulatedClock(transport)
+    operations = Operations(transport, simulation, clock, "warn", move_keeps_odometry=False)
+    parameters = read_parameters({"world_path": "world.yaml", "web_port": 0}.get)
+    return browser_viewer.BrowserViewer(transport, simulation, operations, parameters)
+
+
+@pytest.fixture
+def closed(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The servers that have been closed."""
+    closed: list[Any] = []
+    close = web.WebViewer.close
+    monkeypatch.setattr(
+        web.WebViewer, "close", lambda server: (closed.append(server), close(server))
     )
-    operations: Any = "operations"
-    viewer = browser_viewer.BrowserViewer(transport, simulation, operations, parameters)
-    return viewer, simulation, calls
+    return closed
 
 
-def test_the_server_is_created_from_the_parameters(
-    wired: Any, transport: Any, caplog: pytest.LogCaptureFixture
+def test_a_server_that_starts_during_the_end_is_closed(
+    viewer: Any, closed: list[Any], transport: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
-    viewer, simulation, calls = wired
-    [outer] = simulation.posted
-    outer()
-    thread = simulation.posted[1].__self__
-    assert (thread.name, thread.daemon) == ("flatland-web-start", True)
-    viewer._start()
-    options = {"token": "t", "view_token": "v", "read_only": True}
-    topics = transport.foreign_topics
-    added = {"simulation": simulation, "controller": "operations", "foreign_topics": topics}
-    assert calls == [("create", ("host", 7), options), ("world", ("world",), added), "start"]
-    assert [record.getMessage() for record in caplog.records] == ["viewer in the browser: url"]
-    for _ in range(2):
-        viewer.close()
-    assert calls[3:] == ["close"]
-    assert topics.closed
-
-
-def test_a_server_that_starts_during_the_end_is_closed(wired: Any, transport: Any) -> None:
-    viewer, _, calls = wired
     viewer.close()
     viewer._start()
-    assert calls[2:] == ["start", "close"]
+    assert len(closed) == 1
     assert transport.foreign_topics.closed
+    assert transport.flushed == [REGISTRATION_TIMEOUT]
+    assert caplog.records == []
 
 
 @pytest.mark.parametrize("closing", [False, True])
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [
+        (
+            ValueError("invalid host"),
+            "the viewer in the browser cannot start: invalid host. The simulator continues "
+            "without it",
+        ),
+        (RuntimeError("cause"), "unexpected internal error of the viewer in the browser"),
+    ],
+)
 def test_an_error_of_the_start_is_reported_unless_the_node_ends(
-    wired: Any,
+    viewer: Any,
+    closed: list[Any],
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
+    error: Exception,
+    text: str,
     closing: bool,
 ) -> None:
-    viewer, _, calls = wired
+    def fail(_server: Any) -> None:
+        raise error
 
-    def fail(_viewer: Any) -> None:
-        calls.append("start")
-        raise ValueError("invalid host")
-
-    monkeypatch.setattr(Viewer, "start", fail)
+    monkeypatch.setattr(web.WebViewer, "start", fail)
     if closing:
         viewer.close()
     viewer._start()
-    assert calls[2:] == ["start", "close"]
-    text = (
-        "the viewer in the browser cannot start: invalid host. The simulator continues without it"
-    )
-    assert [record.getMessage() for record in caplog.records] == ([] if closing else [text])
-
-
-def test_an_internal_error_of_the_start_is_logged(
-    wired: Any, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    def fail(_viewer: Any) -> None:
-        raise RuntimeError("cause")
-
-    monkeypatch.setattr(Viewer, "start", fail)
-    wired[0]._start()
-    [record] = caplog.records
-    assert record.getMessage() == "unexpected internal error of the viewer in the browser"
-    assert record.exc_info is not None
+    assert len(closed) == 1
+    is_logged = not closing or isinstance(error, RuntimeError)
+    assert [record.getMessage() for record in caplog.records] == ([text] if is_logged else [])
 
 
 @pytest.mark.parametrize(
     ("cause", "tries"), [(OSError(errno.EADDRINUSE, ""), 51), (OSError(errno.EACCES, ""), 1)]
 )
 def test_a_port_in_use_is_tried_for_ten_seconds(
-    wired: Any, monkeypatch: pytest.MonkeyPatch, cause: OSError, tries: int
+    viewer: Any, monkeypatch: pytest.MonkeyPatch, cause: OSError, tries: int
 ) -> None:
-    viewer, _, calls = wired
     now = [100.0]
     monkeypatch.setattr(browser_viewer, "time", SimpleNamespace(monotonic=lambda: now[0]))
     waits: list[float] = []
+    starts: list[Any] = []
 
     def wait(seconds: float) -> bool:
         waits.append(seconds)
@@ -191,13 +162,13 @@ def test_a_port_in_use_is_tried_for_ten_seconds(
 
     monkeypatch.setattr(viewer._closing, "wait", wait)
 
-    def fail(_viewer: Any) -> None:
-        calls.append("start")
+    def fail(server: Any) -> None:
+        starts.append(server)
         raise FlatlandError("no port") from cause
 
-    monkeypatch.setattr(Viewer, "start", fail)
+    monkeypatch.setattr(web.WebViewer, "start", fail)
     viewer._start()
-    assert calls.count("start") == tries
+    assert len(starts) == tries
     assert waits == [0.2] * (tries - 1)
 
 
@@ -229,12 +200,16 @@ def test_given_tokens_are_those_of_controllers_and_viewers(
         assert client.hello["read_only"]
 
 
-def test_the_viewer_ends_with_the_node(serve: Any, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_viewer_ends_with_the_node(
+    serve: Any, closed: list[Any], caplog: pytest.LogCaptureFixture
+) -> None:
     node = serve(web=True, web_port=0)
     url = url_of_the_page(caplog)
+    node.served.close()
     node.close()
     with pytest.raises(OSError, match="Cannot connect"):
         WebClient(url)
+    assert len(closed) == 1
     assert node.transport.foreign_topics.closed
 
 

@@ -2,190 +2,142 @@
 
 from __future__ import annotations
 
-import logging
-import queue
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from waiting import TIMEOUT, wait_until
+from waiting import wait_until
 
-from flatland.node import deferred_topics, diagnostics, handles, states
+import flatland
 from flatland.node.deferred_topics import DeferredTopics
+from flatland.node.values import Diagnostics
+from flatland.simulation import Simulation
 
 
-class Loop:
-    """The loop of a simulation, whose actions the test runs.
+class Setup:
+    """A world whose requests the test processes, and what is opened besides its topics.
 
     Attributes:
-        thread_names: Names of the threads that have posted actions; the thread of the topics is
-            the only one besides that of the test.
+        loaders: Threads in which modules are imported.
+        opened: Arguments of the debug markers and of the server of handles.
+        closed: Whether the debug markers are closed.
     """
 
-    def __init__(self) -> None:
-        self.thread_names: set[tuple[str, bool]] = set()
-        self._actions: queue.Queue[tuple[Future[Any], Callable[[], object]]] = queue.Queue()
-
-    def post(self, action: Callable[[], object]) -> Future[Any]:
-        thread = threading.current_thread()
-        if thread is not threading.main_thread():
-            self.thread_names.add((thread.name, thread.daemon))
-        future: Future[Any] = Future()
-        self._actions.put((future, action))
-        return future
-
-    def run_one(self) -> None:
-        future, action = self._actions.get(timeout=TIMEOUT)
-        try:
-            future.set_result(action())
-        except Exception as error:
-            future.set_exception(error)
-
-    def run_until(self, event: threading.Event) -> None:
-        while not event.is_set():
-            self.run_one()
-
-    @property
-    def is_empty(self) -> bool:
-        return self._actions.empty()
-
-
-class Part:
-    """A topic that records how it is created."""
-
-    def __init__(self, kind: str, opened: list[Any], *arguments: Any, **options: Any) -> None:
+    def __init__(self, world: flatland.World, transport: Any) -> None:
+        self.world, self.transport = world, transport
+        self.simulation = Simulation(world)
+        self.loaders: list[threading.Thread] = []
+        self.opened: dict[str, tuple[Any, ...]] = {}
         self.closed = False
-        self.created = (kind, arguments, options)
-        opened.append(self)
+        transport.load_debug_markers = lambda: self._load("markers")
+        transport.load_handle_server = lambda: self._load("handles")
 
-    def close(self) -> None:
+    def _load(self, kind: str) -> Callable[..., Any]:
+        self.loaders.append(threading.current_thread())
+
+        def create(*arguments: Any) -> Any:
+            self.opened[kind] = arguments
+            return SimpleNamespace(close=self._close)
+
+        return create
+
+    def _close(self) -> None:
         self.closed = True
 
-
-class Parts:
-    """The parts that a transport opens.
-
-    Attributes:
-        opened: The parts, in their order.
-        transport: Loads debug markers and the server of handles.
-    """
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.opened: list[Part] = []
-        self.imported: list[type[Any]] = []
-        self.server: Any = object()
-        self.transport = SimpleNamespace(
-            load_debug_markers=lambda: self.kind("markers"),
-            load_handle_server=lambda: self.server,
-            publishable=self.imported.append,
+    def start(self, debug_rate: float | None = 30.0) -> DeferredTopics:
+        return DeferredTopics(
+            self.transport, self.simulation, debug_rate=debug_rate, move_keeps_odometry=True
         )
-        monkeypatch.setattr(states, "PauseTopic", self.kind("paused"))
-        monkeypatch.setattr(handles, "Handles", self.kind("handles"))
-        monkeypatch.setattr(diagnostics, "DiagnosticsTopic", self.kind("diagnostics"))
-        self.threads: list[tuple[Any, ...]] = []
-        monkeypatch.setattr(deferred_topics, "TickerThread", self._thread)
 
-    def _thread(self, *arguments: Any) -> str:
-        self.threads.append(arguments)
-        return "thread"
+    def open(self, topics: DeferredTopics) -> set[str]:
+        """Processes requests until the end of the start; returns the topics."""
 
-    def kind(self, name: str) -> Callable[..., Part]:
-        return lambda *arguments, **options: Part(name, self.opened, *arguments, **options)
+        def is_open() -> bool:
+            self.world.requests.process()
+            return topics.opened.is_set()
+
+        wait_until("the topics", is_open)
+        return set(self.transport.topics)
 
 
 @pytest.fixture
-def parts(monkeypatch: pytest.MonkeyPatch) -> Parts:
-    return Parts(monkeypatch)
+def setup(empty_world: flatland.World, transport: Any) -> Setup:
+    return Setup(empty_world, transport)
 
 
-@pytest.fixture
-def loop() -> Loop:
-    return Loop()
-
-
-def start(parts: Parts, loop: Any, debug_rate: float | None = 30.0) -> DeferredTopics:
-    return DeferredTopics(parts.transport, loop, debug_rate=debug_rate, move_keeps_odometry=True)
-
-
-def test_topics_are_opened_in_order_after_the_first_step(parts: Parts, loop: Loop) -> None:
-    topics = start(parts, loop)
-    loop.run_one()  # before the first step
-    assert loop.thread_names == set()
-    loop.run_until(topics.opened)
-    assert [part.created for part in parts.opened] == [
-        ("markers", (loop, 30.0, "thread"), {}),
-        ("paused", (parts.transport, loop), {}),
-        ("handles", (loop, "thread", parts.server), {"move_keeps_odometry": True}),
-        ("diagnostics", (parts.transport, loop), {}),
-    ]
-    assert parts.threads == [("flatland-markers", loop.post)]
-    assert parts.imported == [diagnostics.Diagnostics]
-    assert loop.thread_names == {("flatland-deferred-topics", True)}
-    assert loop.is_empty
-    assert not any(part.closed for part in parts.opened)
+def test_topics_are_opened_after_the_first_step(setup: Setup) -> None:
+    topics = setup.start()
+    before = set(threading.enumerate())
+    setup.world.requests.process()  # before the first step
+    started = {each.name for each in set(threading.enumerate()) - before}
+    assert "flatland-deferred-topics" not in started
+    assert setup.open(topics) == {"~paused", "/diagnostics"}
+    assert {(each.name, each.daemon) for each in setup.loaders} == {
+        ("flatland-deferred-topics", True)
+    }
+    assert setup.opened["markers"][:2] == (setup.simulation, 30.0)
+    post, handles = setup.opened["handles"]
+    assert post == setup.simulation.post
+    assert handles._keep_odometry
+    assert not setup.closed
     topics.close()
-    assert all(part.closed for part in parts.opened)
+    assert setup.closed
 
 
-def test_markers_and_handles_are_optional(parts: Parts, loop: Loop) -> None:
-    parts.server = None
-    topics = start(parts, loop, debug_rate=None)
-    loop.run_until(topics.opened)
-    assert [part.created[0] for part in parts.opened] == ["paused", "diagnostics"]
-
-
-def test_nothing_is_opened_after_the_end(parts: Parts, loop: Loop) -> None:
-    topics = start(parts, loop)
+def test_markers_and_handles_are_optional(setup: Setup, caplog: pytest.LogCaptureFixture) -> None:
+    setup.transport.load_handle_server = lambda: None
+    topics = setup.start(debug_rate=None)
+    assert setup.open(topics) == {"~paused", "/diagnostics"}
+    assert setup.opened == {}
+    assert caplog.records == []
     topics.close()
-    loop.run_until(topics.opened)
-    assert parts.opened == []
 
 
+def test_nothing_is_opened_after_the_end(setup: Setup) -> None:
+    topics = setup.start()
+    topics.close()
+    assert setup.open(topics) == set()
+    assert setup.opened == {}
+
+
+@pytest.mark.parametrize("missing", ["handles", "diagnostics"])
 def test_a_missing_package_of_messages_is_reported(
-    parts: Parts, loop: Loop, caplog: pytest.LogCaptureFixture
+    setup: Setup, caplog: pytest.LogCaptureFixture, missing: str
 ) -> None:
-    def fail() -> None:
+    def fail(*_: object) -> None:
         raise ImportError("no package")
 
-    parts.transport.load_handle_server = fail
-    topics = start(parts, loop)
-    loop.run_until(topics.opened)
-    assert [part.created[0] for part in parts.opened] == ["markers", "paused"]
+    publishable = setup.transport.publishable
+    if missing == "handles":
+        setup.transport.load_handle_server = fail
+    else:
+        setup.transport.publishable = lambda kind: (fail if kind is Diagnostics else publishable)(
+            kind
+        )
+    topics = setup.start()
+    assert setup.open(topics) == {"~paused"}
+    assert set(setup.opened) == {"markers"} | ({"handles"} - {missing})
     [record] = caplog.records
-    assert record.levelno == logging.WARNING
-    assert record.getMessage() == "markers or diagnostics are disabled: no package"
+    text = "markers or diagnostics are disabled: no package"
+    assert (record.levelname, record.getMessage()) == ("WARNING", text)
+    topics.close()
 
 
-def test_a_part_that_fails_is_reported_with_its_traceback(
-    parts: Parts, loop: Loop, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+def test_a_part_that_fails_is_reported_and_does_not_prevent_the_others(
+    setup: Setup, caplog: pytest.LogCaptureFixture
 ) -> None:
     def fail(*_: object) -> None:
         raise RuntimeError("cause")
 
-    monkeypatch.setattr(states, "PauseTopic", fail)
-    topics = start(parts, loop)
-    loop.run_until(topics.opened)
-    assert [part.created[0] for part in parts.opened] == ["markers", "handles", "diagnostics"]
+    setup.transport.load_debug_markers = lambda: fail
+    topics = setup.start()
+    assert setup.open(topics) == {"~paused", "/diagnostics"}
+    assert set(setup.opened) == {"handles"}
     [record] = caplog.records
-    assert record.levelno == logging.ERROR
-    assert record.getMessage() == "cannot publish the pause state: cause"
+    text = "cannot publish debug markers: cause"
+    assert (record.levelname, record.getMessage()) == ("ERROR", text)
     assert record.exc_info is not None
     assert str(record.exc_info[1]) == "cause"
-
-
-def test_a_topic_that_cannot_be_opened_does_not_prevent_the_others(
-    serve: Any,
-    transport: Any,
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    def fail(*_: object) -> None:
-        raise RuntimeError("no room for handles")
-
-    monkeypatch.setattr(transport, "load_handle_server", lambda: fail)
-    serve()
-    wait_until("diagnostics", lambda: "/diagnostics" in transport.topics)
-    assert "cannot publish interactive markers: no room for handles" in caplog.text
+    topics.close()

@@ -66,16 +66,6 @@ def test_a_measurement_of_the_loop_is_not_replaced(world: Any) -> None:
     assert keys(costs) == []
 
 
-def test_a_measurement_replaced_by_the_loop_is_discarded(world: Any) -> None:
-    costs, of_loop = _Costs(world), PluginCosts()
-    costs.begin(0.0)
-    world.plugin_host.costs = of_loop
-    world.step()
-    costs.end(0.2)
-    assert world.plugin_host.costs is of_loop
-    assert keys(costs) == []
-
-
 def test_nothing_is_measured_while_paused(world: Any) -> None:
     costs = _Costs(world)
     world.pause()
@@ -83,12 +73,19 @@ def test_nothing_is_measured_while_paused(world: Any) -> None:
     assert world.plugin_host.costs is None
 
 
-def test_a_reset_ends_the_measurement(world: Any) -> None:
-    costs = _Costs(world)
+@pytest.mark.parametrize("reason", ["replaced by the loop", "paused", "reset"])
+def test_a_measurement_is_discarded(world: Any, reason: str) -> None:
+    costs, of_loop = _Costs(world), PluginCosts()
     costs.begin(0.0)
     world.step()
-    costs.reset()
-    assert world.plugin_host.costs is None
+    if reason == "replaced by the loop":
+        world.plugin_host.costs = of_loop
+    elif reason == "paused":
+        world.pause()
+    else:
+        costs.reset()
+    costs.end(0.2)
+    assert world.plugin_host.costs is (of_loop if reason == "replaced by the loop" else None)
     assert keys(costs) == []
 
 
@@ -160,24 +157,6 @@ def test_the_rate_while_paused_and_without_a_limit(world: Any) -> None:
     assert status.values["target real-time factor"] == "inf"
 
 
-def test_nothing_is_measured_without_a_subscriber(world: Any, transport: Any) -> None:
-    diagnostics = DiagnosticsTopic(transport, Simulation(world))
-    topic = transport.topics["/diagnostics"]
-    try:
-        assert not diagnostics._tick(0.0)
-        assert world.plugin_host.costs is None
-        topic.connected = True
-        for _ in range(11):
-            assert diagnostics._tick(0.0)
-        assert world.plugin_host.costs is not None
-        assert len(topic.sent) == 2  # one of five ticks; the first tick only starts
-        topic.connected = False
-        assert not diagnostics._tick(0.0)
-        assert world.plugin_host.costs is None
-    finally:
-        diagnostics.close()
-
-
 def test_the_rate_starts_again_with_a_reset(world: Any) -> None:
     rate = _Rate(Simulation(world, 100.0))
     rate.status(10.0)
@@ -233,15 +212,6 @@ def test_the_largest_costs_are_listed_first(world: Any) -> None:
     assert (status.name, status.level) == ("plugins", Level.OK)
 
 
-def test_a_measurement_that_ends_while_paused_is_discarded(world: Any) -> None:
-    costs = _Costs(world)
-    costs.begin(0.0)
-    world.step()
-    world.pause()
-    costs.end(0.2)
-    assert keys(costs) == []
-
-
 def test_a_message_has_the_statuses_of_the_node(
     world: Any, transport: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -249,12 +219,14 @@ def test_a_message_has_the_statuses_of_the_node(
     monkeypatch.setattr("flatland.node.diagnostics.time.perf_counter", lambda: now[0])
     diagnostics = DiagnosticsTopic(transport, Simulation(world, 100.0))
     topic = transport.topics["/diagnostics"]
-    topic.connected = True
     sent = []
     try:
+        assert not diagnostics._tick(0.0)
+        assert world.plugin_host.costs is None
+        topic.connected = True
         assert diagnostics._ticker.period == 0.2
         for tick in range(11):
-            diagnostics._tick(0.0)
+            assert diagnostics._tick(0.0)
             sent.append(len(topic.sent))
             # Costs are measured from the tick of a message to the next one.
             assert (world.plugin_host.costs is not None) is (tick % 5 == 0)

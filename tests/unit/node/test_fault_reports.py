@@ -80,50 +80,46 @@ def run_thread(target: Callable[[], object]) -> None:
     thread.join(TIMEOUT)
 
 
-@pytest.mark.parametrize("kind", ["method", "function"])
-def test_an_exception_is_attributed_to_the_plugin_that_raised_it(
+OWNER = 'Model Plugin "bad" type "test::Failing" model "robot"'
+
+
+@pytest.mark.parametrize(
+    ("kind", "plugins", "owners"),
+    [
+        ("method", "[]", OWNER),
+        ("function", "[]", OWNER),
+        # The file is that of several plugins.
+        (
+            "function",
+            '[{type: "test::OfWorld", name: outer}]',
+            f'World Plugin "outer" type "test::OfWorld" or {OWNER}',
+        ),
+    ],
+)
+def test_an_exception_is_attributed_to_the_plugins_that_may_have_raised_it(
     reports: FaultReports,
     files: Any,
     caplog: pytest.LogCaptureFixture,
     monkeypatch: pytest.MonkeyPatch,
     kind: str,
+    plugins: str,
+    owners: str,
 ) -> None:
     files.write("failing_plugin_of_reports.py", PLUGIN)
+    files.write("robot.model.yaml", ROBOT)
     monkeypatch.setenv("FLATLAND_PLUGIN_PATH", files.write("manifest.xml", MANIFEST))
     monkeypatch.setattr(sys, "path", list(sys.path))
     monkeypatch.delitem(sys.modules, "failing_plugin_of_reports", raising=False)
-    reports.world = files.load_model(ROBOT)
+    models = "[{name: robot, model: robot.model.yaml}]"
+    reports.world = files.load(
+        f"{{properties: {{}}, layers: [{{name: 2d}}], models: {models}, plugins: {plugins}}}"
+    )
     plugin = reports.world.model("robot").plugin("bad")
     run_thread(plugin.fail if kind == "method" else sys.modules[type(plugin).__module__].fail)
     [record] = caplog.records
-    assert record.getMessage() == (
-        'thread "worker" of Model Plugin "bad" type "test::Failing" model "robot" ended with an '
-        "exception"
-    )
+    assert record.getMessage() == f'thread "worker" of {owners} ended with an exception'
     assert record.exc_info is not None
     assert str(record.exc_info[1]) == "cause"
-
-
-def test_an_exception_in_a_file_of_several_plugins_names_all_of_them(
-    reports: FaultReports,
-    files: Any,
-    caplog: pytest.LogCaptureFixture,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    files.write("failing_plugin_of_reports.py", PLUGIN)
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", files.write("manifest.xml", MANIFEST))
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    monkeypatch.delitem(sys.modules, "failing_plugin_of_reports", raising=False)
-    files.write("robot.model.yaml", ROBOT)
-    reports.world = files.load(
-        "{properties: {}, layers: [{name: 2d}], models: [{name: r, model: robot.model.yaml}], "
-        'plugins: [{type: "test::OfWorld", name: outer}]}'
-    )
-    run_thread(sys.modules["failing_plugin_of_reports"].fail)
-    assert [record.getMessage() for record in caplog.records] == [
-        'thread "worker" of World Plugin "outer" type "test::OfWorld" or Model Plugin "bad" type '
-        '"test::Failing" model "r" ended with an exception'
-    ]
 
 
 def test_an_exception_without_a_thread_and_a_value_is_reported(

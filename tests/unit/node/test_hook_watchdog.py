@@ -76,24 +76,19 @@ def test_a_check_that_fails_is_logged_and_repeated(
     assert "RuntimeError: no frame" in caplog.text
 
 
-def test_the_thread_of_the_simulation_is_watched(
+def test_the_thread_of_the_simulation_is_watched_until_the_end(
     empty_world: flatland.World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("LIMIT", "_POLL_PERIOD"):
         monkeypatch.setattr(f"flatland.node.hook_watchdog.{name}", 0.01)
-    watchdog = HookWatchdog(empty_world)
-    Blocking().hook(lambda: wait_until("the report", lambda: empty_world.requests.blocked_by))
-    wait_until("the end", lambda: not empty_world.requests.blocked_by)
-    watchdog.close()
-
-
-def test_a_closed_watchdog_ends_its_thread(empty_world: flatland.World) -> None:
     before = set(threading.enumerate())
     watchdog = HookWatchdog(empty_world)
-    started = set(threading.enumerate()) - before
     # A ROS node of other tests in this process starts threads at any time.
-    [thread] = [each for each in started if each.name.startswith("flatland-")]
-    assert (thread.name, thread.daemon) == ("flatland-hook-watchdog", True)
+    started = set(threading.enumerate()) - before
+    [thread] = [each for each in started if each.name == "flatland-hook-watchdog"]
+    assert thread.daemon
+    Blocking().hook(lambda: wait_until("the report", lambda: empty_world.requests.blocked_by))
+    wait_until("the end", lambda: not empty_world.requests.blocked_by)
     watchdog.close()
     thread.join(TIMEOUT)
     assert not thread.is_alive()

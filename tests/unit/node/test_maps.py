@@ -14,7 +14,6 @@ from waiting import wait_until
 from flatland.errors import FlatlandError
 from flatland.maps.map_image import image_edges
 from flatland.maps.occupancy_grid import OccupancyGrid
-from flatland.node.maps import PublishedLayer
 from flatland.node.parameters import ParameterError
 from flatland.node.transport import CallError
 
@@ -186,55 +185,40 @@ def test_grids_are_converted_in_the_threads_that_receive_them(
     assert threads == [threading.current_thread()] * 2
 
 
-def test_a_large_map_is_replaced(start: Any) -> None:
-    node = start()
-    request = {"layer": "2d", "map_path": ""}
-    node.transport.receivable = lambda _type: (OccupancyGrid, lambda _grid: box(2000, 0.05))
-    answer = node.call("set_layer_map", grid=SimpleNamespace(data=[0]), **request)
-    assert answer.success
-    assert node.call("step_world", duration=0.0).success
-    assert static_map(node).grid.cells.shape == (2000, 2000)
-
-
 def test_a_map_is_latched_and_published_once(start: Any) -> None:
-    options: list[Any] = []
-    node = start(RASTER)
-    values = node.transport.values
-
-    def advertise(*arguments: Any, **given: Any) -> Any:
-        options.append((arguments[0], given["latch"], given["on_connection"] is not None))
-        return values(*arguments, **given)
-
-    node.transport.values = advertise
-    served = PublishedLayer(node.transport, node.world, "2d", "map", 1.0)
-    assert options == [("map", True, True), ("map_metadata", True, True)]
-    topic = node.transport.topics["map"]
-    served._on_connection(False)
-    assert not served._requested
-    topic.connect()
-    wait_until("the map", lambda: shapes(node, "map") == [(3, 5)])
-    started: list[int] = []
-    served._start_publishing = lambda: started.append(1)  # type: ignore[method-assign]
-    served._on_connection(True)
-    assert started == []
+    topics = start(RASTER).transport.topics
+    assert topics["map"].options["latch"] is topics["map_metadata"].options["latch"] is True
+    topics["map_metadata"].disconnect()
+    for name in ("map", "map_metadata"):
+        topics[name].connect()
+        wait_until("the map", lambda: topics["map"].sent)
+        assert len(topics["map"].sent) == 1
 
 
 @pytest.mark.parametrize(
     ("error", "has_traceback"), [(FlatlandError("cause"), False), (RuntimeError("cause"), True)]
 )
 def test_a_map_that_cannot_be_published_is_reported(
-    start: Any, caplog: pytest.LogCaptureFixture, error: Exception, has_traceback: bool
+    start: Any,
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+    error: Exception,
+    has_traceback: bool,
 ) -> None:
     node = start(RASTER)
-    served = PublishedLayer(node.transport, node.world, "2d", "map", 1.0)
+    topic = node.transport.topics["map"]
 
-    def fail() -> Any:
+    def fail(_message: Any) -> None:
         raise error
 
-    served._load = fail  # type: ignore[method-assign]
-    served._requested = True
-    served._publish()
-    assert not served._requested  # The next subscriber causes another attempt.
-    [record] = [each for each in caplog.records if each.levelname == "ERROR"]
+    def errors() -> list[Any]:
+        return [each for each in caplog.records if each.levelname == "ERROR"]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(topic, "publish", fail)
+        topic.connect()
+        [record] = wait_until("the error", errors)
     assert record.getMessage() == "cannot publish the map: cause"
     assert bool(record.exc_info) is has_traceback
+    topic.connect()  # The next subscriber causes another attempt.
+    wait_until("the map", lambda: topic.sent)

@@ -129,8 +129,8 @@ def test_a_message_that_cannot_be_sent_does_not_affect_the_others(
     update.function = emit
     assert setup.step() == ["start 0", "clock 5", "tf", "second", "first"]
     assert setup.topics["/second"].sent == [8.0]
-    assert 'subscriber ROS topic "/first"' in caplog.text
-    assert 'of output "/first" raised' in caplog.text
+    assert 'subscriber ROS topic "/first" (adapter ' in caplog.text
+    assert 'find_adapter.<locals>.<lambda>) of output "/first" raised' in caplog.text
 
 
 def test_the_time_of_a_message_is_part_of_the_costs_of_its_plugin(setup: Setup) -> None:

@@ -1,9 +1,8 @@
-"""The run of a node: what ends it, its exit code, and the order of its parts."""
+"""The run of a node: what ends it, and its exit code."""
 
 from __future__ import annotations
 
 import gc
-import logging
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -11,35 +10,20 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
+from waiting import TIMEOUT, wait_until
 
 from flatland.errors import FlatlandError
-from flatland.node import run, served_world
-from flatland.node.parameters import ParameterError
+from flatland.node import run
+from flatland.node.clock import SimulatedClock
+from flatland.node.parameters import ParameterError, read_parameters
 from flatland.node.run import NodeRun
-
-
-class Served:
-    """A world that records its use in `calls`."""
-
-    def __init__(self, calls: list[Any], *arguments: Any) -> None:
-        calls.append(("load", *arguments))
-        self._calls = calls
-        self.world = object()
-        self.simulation = self
-
-    def stop(self) -> None:
-        self._calls.append("stop")
-
-    def run(self) -> None:
-        self._calls.append(("run", gc.isenabled()))
-
-    def close(self) -> None:
-        self._calls.append("close")
+from flatland.node.served_world import ServedWorld
+from flatland.world import World
 
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
-    """What the parts of the run do, in order; no handler of the process is replaced."""
+    """What a run changes of the process, which nothing of it does in a test."""
     calls: list[Any] = []
 
     class Watchdog:
@@ -57,11 +41,11 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Any]]:
 
     monkeypatch.setattr(run, "ShutdownWatchdog", Watchdog)
     monkeypatch.setattr(run, "FaultReports", Reports)
-    monkeypatch.setattr(served_world, "ServedWorld", lambda *arguments: Served(calls, *arguments))
     monkeypatch.setattr(
         sys, "setswitchinterval", lambda seconds: calls.append(("switch interval", seconds))
     )
     yield calls
+    gc.unfreeze()
     gc.enable()
 
 
@@ -77,43 +61,48 @@ def unregister() -> None:
 def node(calls: list[Any]) -> NodeRun:
     node = NodeRun(is_fault, unregister)
     assert calls == [("reports", is_fault), "reports installed", ("switch interval", 0.0002)]
-    calls.clear()
+    assert node.watchdog.unregister is unregister  # type: ignore[attr-defined]
     return node
 
 
-def test_a_world_is_loaded_run_and_closed(node: NodeRun, calls: list[Any]) -> None:
-    @contextmanager
-    def more(served: Any) -> Iterator[None]:
-        calls.append(("more", served.world is not None))
-        yield
-        calls.append("no more")
-
-    gc.disable()
-    node.serve("parameters", "transport", "clock", more, lambda: calls.append("ended"))  # type: ignore[arg-type]
-    assert calls == [
-        ("load", "parameters", "transport", "clock"),
-        ("more", True),
-        ("run", True),
-        "ended",
-        "no more",
-        "close",
-    ]
-    assert node._fault_reports.world is node._simulation.world  # type: ignore[union-attr]
-    assert node.watchdog.unregister is unregister  # type: ignore[attr-defined]
-    calls.clear()
-    node.watchdog.stop()  # type: ignore[attr-defined]
-    assert node.stopping.is_set()
-    assert calls == ["stop"]
-
-
-def test_a_stop_before_the_world_is_loaded_stops_its_simulation(
-    node: NodeRun, calls: list[Any]
+@pytest.mark.parametrize("stopped_before", [False, True])
+def test_a_world_is_loaded_run_until_a_stop_and_closed(
+    node: NodeRun, files: Any, transport: Any, stopped_before: bool
 ) -> None:
-    node.watchdog.stop()  # type: ignore[attr-defined]
-    assert isinstance(node.stopping, threading.Event)
-    assert calls == []
-    node.serve(None, None, None)  # type: ignore[arg-type]
-    assert calls == [("load", None, None, None), "stop", ("run", True), "close"]
+    events: list[Any] = []
+    stop = node.watchdog.stop  # type: ignore[attr-defined]
+
+    def stop_after_a_step(world: World) -> None:
+        wait_until("a step", lambda: world.time > 0.0)
+        stop()
+
+    @contextmanager
+    def more(served: ServedWorld) -> Iterator[None]:
+        events.append(served.world)
+        if not stopped_before:
+            served.simulation.post(lambda: events.append(gc.isenabled()))
+            threading.Thread(target=stop_after_a_step, args=(served.world,)).start()
+        yield
+        assert not served.world.closed
+        assert (served.world.time == 0.0) is stopped_before
+        events.append("no more")
+
+    path = files.write("world.yaml", "{properties: {}, layers: []}")
+    parameters = read_parameters({"world_path": path}.get)
+    gc.disable()
+    if stopped_before:
+        stop()
+    clock = SimulatedClock(transport)
+    node.serve(parameters, transport, clock, more, lambda: events.append("ended"))
+    world = events.pop(0)
+    assert events == [*([] if stopped_before else [True]), "ended", "no more"]
+    assert world.closed
+    assert node.stopping.is_set()
+    assert node._fault_reports.world is world
+    # It may log that the world is closed.
+    for thread in threading.enumerate():
+        if thread.name == "flatland-deferred-topics":
+            thread.join(TIMEOUT)
 
 
 @pytest.mark.parametrize(
@@ -133,7 +122,7 @@ def test_a_failure_is_the_exit_code_unless_a_stop_was_requested(
     has_traceback: bool,
     stopping: bool,
 ) -> None:
-    caplog.set_level(logging.INFO, "flatland")
+    caplog.set_level("INFO", "flatland")
 
     def simulate() -> None:
         raise error

@@ -6,6 +6,7 @@ import math
 import re
 import threading
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,17 +17,47 @@ import pytest
 from waiting import TIMEOUT, wait_until
 
 import flatland
-from flatland.errors import FlatlandError
+from flatland.errors import FlatlandError, PluginError
+from flatland.node import served_world
 from flatland.node.clock import SimulatedClock
 from flatland.node.parameters import ParameterError, read_parameters
 from flatland.node.served_world import ServedWorld
 from flatland.node.services import SERVICES
+from flatland.simulation import Simulation
 
 WORLD = "{properties: {}, layers: [{name: 2d}]}"
 
 
+class Plugin(flatland.ModelPlugin):
+    """A plugin whose only hooks are those that a test sets."""
+
+    def on_initialize(self, config: Any) -> None:
+        self.last = self.output("/last", float)
+        self.start()
+
+    def start(self) -> None:
+        """Does what a test sets."""
+
+
+@pytest.fixture
+def world_of_plugin(files: Any, declare_plugins: Any) -> str:
+    """The text of a world with a model with a plugin, and of a layer whose name is a parameter."""
+    declare_plugins(Plugin)
+    files.write(
+        "robot.model.yaml",
+        """
+        bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
+        plugins: [{type: "test::Plugin", name: plugin}]
+        """,
+    )
+    return """
+        properties: {}
+        layers: [{name: '$eval param("/layer", "none")'}]
+        models: [{name: r, model: robot.model.yaml}]
+        """
+
+
 def test_a_running_world_has_its_topics_and_services(serve: Any, transport: Any) -> None:
-    transport.parameters = {}
     node = serve()
     assert set(transport.services) == {service.name for service in SERVICES}
     assert {"/clock", "/tf", "model_states"} <= set(transport.topics)
@@ -50,11 +81,16 @@ def test_debug_markers_are_opened_with_show_viz(
 
 
 @pytest.mark.parametrize(
-    ("world", "parameters", "error"),
+    ("world", "parameters", "error", "text"),
     [
-        ("{properties: {}, layers: 7}", {}, FlatlandError),
-        (WORLD, {"publish_map": "none"}, ParameterError),
-        (WORLD, {"record_mcap": "/no/folder/a.mcap"}, FlatlandError),
+        ("{properties: {}, layers: 7}", {}, FlatlandError, "layers"),
+        (WORLD, {"publish_map": "none"}, ParameterError, "publish_map"),
+        (
+            WORLD,
+            {"record_mcap": "/no/folder/a.mcap"},
+            FlatlandError,
+            '^cannot create "/no/folder/a.mcap": No such file or directory$',
+        ),
     ],
     ids=["world", "map", "recording"],
 )
@@ -65,6 +101,7 @@ def test_a_node_that_cannot_start_leaves_no_thread_and_no_world(
     world: str,
     parameters: dict[str, Any],
     error: type[Exception],
+    text: str,
 ) -> None:
     closed: list[flatland.World] = []
     opened: list[flatland.World] = []
@@ -82,7 +119,7 @@ def test_a_node_that_cannot_start_leaves_no_thread_and_no_world(
     monkeypatch.setattr(transport, "record", fail)
     before = set(threading.enumerate())
     given = {"world_path": files.write("world.yaml", world), **parameters}
-    with pytest.raises(error):
+    with pytest.raises(error, match=text):
         ServedWorld(read_parameters(given.get), transport, SimulatedClock(transport))
     for thread in set(threading.enumerate()) - before:
         thread.join(TIMEOUT)
@@ -91,11 +128,25 @@ def test_a_node_that_cannot_start_leaves_no_thread_and_no_world(
     assert transport.topics["/clock"].closed
 
 
-def test_a_recording_of_messages_is_closed_with_the_world(serve: Any, transport: Any) -> None:
-    node = serve(record_mcap="/run.mcap")
-    assert not transport.topics["/run.mcap"].closed
-    node.close()
-    assert transport.topics["/run.mcap"].closed
+def test_plugins_end_before_their_topics_the_recording_and_the_clock(
+    serve: Any, transport: Any, world_of_plugin: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    open_topics: list[set[str]] = []
+
+    def end(plugin: Any) -> None:
+        plugin.last.emit(1.0)
+        open_topics.append({name for name, topic in transport.topics.items() if not topic.closed})
+
+    monkeypatch.setattr(Plugin, "on_shutdown", end)
+    node = serve(world_of_plugin, record_mcap="/run.mcap")
+    topics = transport.topics
+    topics["/last"].connect()
+    for _ in range(2):
+        node.close()
+    assert open_topics == [set(topics)]
+    assert topics["/last"].sent == [1.0]
+    # The transport closes topics of the world all at once.
+    assert {name for name in topics if topics[name].closed} == {"/run.mcap", "/clock"}
 
 
 def test_the_end_stops_all_threads(serve: Callable[..., Any]) -> None:
@@ -128,18 +179,6 @@ def test_a_map_is_simplified_on_request(serve: Any, files: Any) -> None:
     assert simplified < exact / 2
 
 
-def test_a_running_world_is_reset(serve: Any) -> None:
-    node = serve(update_rate=0)
-    timekeeper = node.world.timekeeper
-    for _ in range(5):
-        wait_until("steps", lambda: timekeeper.sim_time > 0.3)
-        assert node.call("reset_world", keep_time=False, seed=-1).success
-        node.call("pause")
-        assert node.call("reset_world", keep_time=False, seed=-1).success
-        assert timekeeper.sim_time_ns == 0
-        node.call("resume")
-
-
 def test_a_lower_and_a_higher_rate_take_effect(serve: Any, transport: Any) -> None:
     node = serve()
     timekeeper = node.world.timekeeper
@@ -152,19 +191,60 @@ def test_a_lower_and_a_higher_rate_take_effect(serve: Any, transport: Any) -> No
     assert transport.parameters["~update_rate"] == 0.0
 
 
-def test_parameters_of_the_world(serve: Any, tmp_path: Path) -> None:
+def test_parameters_of_the_world(
+    serve: Any, transport: Any, tmp_path: Path, world_of_plugin: str, caplog: Any
+) -> None:
+    caplog.set_level("INFO", "flatland")
     record = tmp_path / "run.jsonl"
-    node = serve(step_size=0.02, update_rate=33.0, seed=7, record=str(record))
+    transport.parameters["/layer"] = "2d"
+    given = {"step_size": 0.02, "update_rate": 33.0, "max_lag": 0.5, "seed": 7}
+    node = serve(
+        world_of_plugin,
+        record=str(record),
+        record_mcap="/run.mcap",
+        model_path=str(tmp_path),
+        **given,
+    )
     assert node.world.seed == 7
-    assert record.exists()
+    assert [layer.name for layer in node.world.layers] == ["2d"]
+    assert node.world.model_path == (str(tmp_path),)
     assert node.world.timekeeper.step_size == 0.02
     assert node.served.simulation.rate == pytest.approx(33.0)
+    assert node.served.simulation._max_lag == 0.5
+    # Other faults do not end a node.
+    assert (node.world.plugin_errors, node.world.on_invalid_body) == ("disable", "remove")
+    assert record.exists()
+    path = re.escape(str(tmp_path / "world.yaml"))
+    assert re.search(rf'loaded "{path}" in \d+\.\d\d s: 1 layers, 1 models', caplog.text)
+    assert f'recording the run to "{record}"' in caplog.text
+    assert 'recording messages to "/run.mcap"' in caplog.text
 
 
-def test_a_benchmark_logs_its_speed(serve: Any, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_start_of_a_plugin_is_limited(
+    serve: Any, world_of_plugin: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    end = threading.Event()
+    monkeypatch.setattr(Plugin, "start", lambda _plugin: end.wait(TIMEOUT))
+    with pytest.raises(PluginError, match=r"on_initialize did not return within 0\.01 s"):
+        serve(world_of_plugin, plugin_timeout=0.01)
+    end.set()
+
+
+def test_a_benchmark_logs_its_speed_at_its_end(serve: Any, caplog: Any) -> None:
     caplog.set_level("INFO")
+    serve(benchmark_duration=1e4).close()
+    assert "benchmark: " not in caplog.text
     serve(benchmark_duration=0.05)
     wait_until("the end", lambda: "benchmark: " in caplog.text)
     found = re.search(r"benchmark: 10 iterations in ([\d.]+) s of wall time, ([\d.]+)", caplog.text)
     assert found is not None
     assert 10 / float(found[2]) == pytest.approx(float(found[1]), abs=0.002)
+
+
+def test_the_performance_of_the_loop_is_logged_for_developers(
+    serve: Any, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(served_world, "Simulation", partial(Simulation, report_period=0.01))
+    caplog.set_level("DEBUG", "flatland")
+    serve()
+    wait_until("a report", lambda: [each for each in caplog.records if each.levelname == "DEBUG"])

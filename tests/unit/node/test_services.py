@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 from typing import Any
@@ -12,6 +13,9 @@ import numpy as np
 import pytest
 from waiting import TIMEOUT, wait_until
 
+from flatland.errors import WorldError
+from flatland.node import services
+from flatland.node.transport import REGISTRATION_TIMEOUT, CallError
 from flatland.runtime import file_reads
 from flatland.values import OccupancyGrid
 
@@ -25,6 +29,15 @@ plugins: [{type: DiffDrive, name: drive, body: base}]
 
 def pose(x: float = 0.0, y: float = 0.0, theta: float = 0.0) -> SimpleNamespace:
     return SimpleNamespace(x=x, y=y, theta=theta)
+
+
+@pytest.fixture
+def opening(transport: Any) -> Iterator[threading.Event]:
+    """The topics that are opened after the first step wait for it."""
+    event = threading.Event()
+    transport.load_handle_server = lambda: not event.wait(TIMEOUT) or None
+    yield event
+    event.set()
 
 
 @pytest.fixture
@@ -74,80 +87,157 @@ def test_a_call_fails_if_its_files_are_not_read_in_time(
     assert (late.success, late.message) == (False, text)
 
 
-def test_a_second_toggle_during_a_drag_keeps_the_world_paused(node: Any) -> None:
+@pytest.mark.parametrize("toggles", [1, 2])
+def test_toggles_during_a_drag_outlast_it(node: Any, toggles: int) -> None:
     holds = node.served.simulation.holds
     node.run(lambda: holds.hold("drag"))
     node.call("toggle_pause")
     assert not node.world.paused
-    node.call("toggle_pause")
+    if toggles == 2:
+        node.call("toggle_pause")
     node.run(lambda: holds.release("drag"))
-    assert node.world.paused
+    assert node.world.paused is (toggles == 2)
 
 
-def test_one_toggle_during_a_drag_resumes_the_world(node: Any) -> None:
-    holds = node.served.simulation.holds
-    node.run(lambda: holds.hold("drag"))
-    node.call("toggle_pause")
-    node.run(lambda: holds.release("drag"))
-    assert not node.world.paused
+def test_a_node_is_ready_after_all_topics_are_open_registered_and_connected(
+    opening: threading.Event, node: Any, transport: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slept: list[float] = []
+    clock = SimpleNamespace(monotonic=lambda: 10.0 + sum(slept), sleep=slept.append)
+    monkeypatch.setattr(services, "time", clock)
 
-
-def test_wait_until_ready_returns_after_the_connection_of_a_topic(node: Any) -> None:
-    def answer(timeout: float, *topics: str) -> tuple[bool, str]:
+    def message(*topics: str, timeout: float = 0.0) -> str:
         answer = node.call("wait_until_ready", topics=topics, timeout=timeout)
-        return answer.success, getattr(answer, "message", "")
+        assert answer.success is not hasattr(answer, "message")
+        return getattr(answer, "message", "")
 
-    assert answer(TIMEOUT) == (True, "")
-    missing = (False, "not ready after 0 s: no connection to /tf, model_states")
-    assert answer(0, "/tf", "model_states") == missing
-    with ThreadPoolExecutor() as pool:
-        waiting = pool.submit(answer, TIMEOUT, "/tf")
-        node.transport.topics["/tf"].connect()
-        assert waiting.result(TIMEOUT) == (True, "")
-
-
-@pytest.mark.parametrize("timeout", [-1.0, math.nan, math.inf])
-def test_wait_until_ready_with_an_invalid_time_limit(node: Any, timeout: float) -> None:
-    answer = node.call("wait_until_ready", topics=[], timeout=timeout)
-    assert answer.success is False
-    assert answer.message == f"timeout must be finite and not negative [s], got {timeout}"
+    opened = "the topics that are opened after the first step are not open"
+    assert message("/tf") == f"not ready after 0 s: {opened}"
+    opening.set()
+    wait_until("the topics", lambda: opened not in message())
+    transport.topics["/tf"].connect()
+    transport.registers = False
+    registered = "the registration with the ROS master is not complete"
+    assert message("/tf") == f"not ready after 0 s: {registered}"
+    assert transport.flushed[-1] == 0.01
+    transport.registers = True
+    assert message("/tf") == ""
+    missing = "no connection to model_states, /clock"
+    assert message("/tf", "model_states", "/clock") == f"not ready after 0 s: {missing}"
+    assert slept == []
+    missing = "no connection to /clock"
+    assert message("/clock", timeout=0.5) == f"not ready after 0.5 s: {missing}"
+    assert set(slept) == {0.01}
+    assert sum(slept) == pytest.approx(0.5, abs=0.011)
+    transport.shutting_down = True
+    assert message("/clock", timeout=0.5) == "the simulator is shutting down"
 
 
 def test_models_are_spawned_moved_and_deleted(node: Any) -> None:
     assert spawn(node, "a", 1.0).success
-    assert node.call("move_model", name="a", pose=pose(2.0)).success
+    assert node.call("move_model", name="a", pose=pose(2.0, 3.0, 0.5)).success
     answer = node.call("get_model_states", names=[])
     assert (answer.success, answer.states.names, answer.states.namespaces) == (True, ("a",), ["r"])
-    assert answer.states.poses.tolist() == [[2.0, 0.0, 0.0]]
+    assert answer.states.poses.tolist() == [[2.0, 3.0, 0.5]]
     assert node.call("delete_model", name="a").success
+    node.transport.flushed.clear()
     again = node.call("delete_model", name="a")
     assert again.success is False
     assert again.message.endswith('model with name "a" does not exist')
+    assert node.transport.flushed == [REGISTRATION_TIMEOUT]
 
 
-@pytest.mark.parametrize(("rate", "count"), [(50, 5), (0, 20)])
-def test_states_are_published_at_a_rate_of_simulated_time(
-    serve: Any, rate: float, count: int
+def test_appearances_are_changed(node: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    spawn(node, "a")
+    (body,) = node.world.model("a").bodies
+    layers: list[Any] = []
+    change = node.world.set_appearance
+
+    def set_appearance(*arguments: Any, **options: Any) -> None:
+        layers.append(options["layers"])
+        change(*arguments, **options)
+
+    monkeypatch.setattr(node.world, "set_appearance", set_appearance)
+    request = {"model": "a", "body": "base"}
+    red = [1.0, 0.0, 0.0, 0.5]
+    for color, given, number, visible in (
+        (red, ["2d"], -1, False),
+        ([], [], 0, False),
+        ([], [], 1, True),
+    ):
+        answer = node.call("set_appearance", color=color, layers=given, visible=number, **request)
+        assert answer.success
+        assert (list(body.color), body.visible) == (red, visible)
+    assert layers == [["2d"], None, None]
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (WorldError("no such model"), "no such model"),
+        (KeyError("cause"), "KeyError: 'cause'"),
+        (CallError("blocked"), "blocked"),
+    ],
+)
+def test_a_failure_is_part_of_the_response(
+    node: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    error: Exception,
+    message: str,
 ) -> None:
-    node = serve(lockstep=True, model_states_rate=rate)
+    def fail(*_: object) -> None:
+        raise error
+
+    for name in ("delete_model", "pause"):
+        monkeypatch.setattr(node.world, name, fail)
+    answer = node.call("delete_model", name="a")
+    assert answer.success is False
+    assert answer.message.endswith(message)
+    with pytest.raises(CallError):  # The response has no fields.
+        node.call("pause")
+    expected = ["unexpected internal error in a service call"] * 2
+    logged = [each.getMessage() for each in caplog.records if each.levelname == "ERROR"]
+    assert logged == (expected if isinstance(error, KeyError) else [])
+
+
+def test_the_time_is_controlled(node: Any) -> None:
+    for name, paused in (("pause", True), ("resume", False), ("toggle_pause", True)):
+        assert vars(node.call(name)) == {}
+        assert node.world.paused is paused
+    node.call("step_world", duration=0.1)
+    for seed, keep_time, expected in ((-1, True, (1, 20)), (0, False, (0, 0))):
+        assert node.call("reset_world", seed=seed, keep_time=keep_time).success
+        assert (node.world.seed, node.world.timekeeper.sim_time_ns // STEP_NS) == expected
+
+
+def test_states_are_published_in_each_step_without_a_rate(serve: Any) -> None:
+    node = serve(lockstep=True, model_states_rate=0)
     topic = node.transport.topics["model_states"]
     topic.connect()
     node.run(topic.sent.clear)
     node.call("step_world", duration=0.1)
-    assert len(topic.sent) == count
+    assert len(topic.sent) == 20
 
 
-def test_failed_batches_name_the_item(node: Any) -> None:
-    spec = SimpleNamespace(yaml_path="robot.model.yaml", name="a", ns="", pose=pose())
-    missing = SimpleNamespace(yaml_path="none.model.yaml", name="b", ns="", pose=pose())
-    failed = node.call("spawn_models", models=[spec, missing])
+def test_batches_succeed_or_name_the_item(node: Any) -> None:
+    def spec(name: str, x: float, path: str = "robot.model.yaml") -> SimpleNamespace:
+        return SimpleNamespace(yaml_path=path, name=name, ns=f"n{name}", pose=pose(x, 1.0, 2.0))
+
+    failed = node.call("spawn_models", models=[spec("a", 0.0), spec("b", 0.0, "none.model.yaml")])
     assert (failed.success, failed.index) == (False, 1)
     assert node.world.models == []
-    done = node.call("spawn_models", models=[spec])
-    assert (done.success, done.index, done.poses) == (True, -1, [(0.0, 0.0, 0.0)])
-    assert node.call("move_models", models=[SimpleNamespace(name="c", pose=pose())]).index == 0
+    done = node.call("spawn_models", models=[spec("a", 0.0), spec("b", 3.0)])
+    poses = [(0.0, 1.0, 2.0), (3.0, 1.0, 2.0)]
+    assert (done.success, done.message, done.index, done.poses) == (True, "", -1, poses)
+    assert node.call("get_model_states", names=[]).states.namespaces == ["na", "nb"]
+    done = node.call("move_models", models=[spec("b", 5.0), spec("a", 6.0)])
+    poses = [(5.0, 1.0, 2.0), (6.0, 1.0, 2.0)]
+    assert (done.success, done.message, done.index, done.poses) == (True, "", -1, poses)
+    assert node.call("move_models", models=[spec("c", 0.0)]).index == 0
     assert node.call("delete_models", names=["a", "c"]).index == 1
     assert node.call("delete_models", names=["a"]).index == -1
+    assert [model.name for model in node.world.models] == ["b"]
 
 
 @pytest.mark.parametrize(
@@ -191,18 +281,6 @@ def test_steps_of_a_running_world_are_additional(serve: Any) -> None:
     assert node.call("step_world", duration=0.0).stamp == 22 * STEP_NS
 
 
-def test_clients_are_served_one_after_the_other(node: Any) -> None:
-    def client() -> list[int]:
-        return [node.call("step_world", duration=0.01).stamp for _ in range(25)]
-
-    with ThreadPoolExecutor(4) as pool:
-        answers = [pool.submit(client) for _ in range(4)]
-        times = [answer.result(TIMEOUT) for answer in answers]
-    assert all(mine == sorted(mine) for mine in times)
-    together = sorted(time for mine in times for time in mine)
-    assert together == [n * 2 * STEP_NS for n in range(1, 101)]
-
-
 @pytest.mark.parametrize(
     ("duration", "message"),
     [
@@ -234,25 +312,14 @@ def test_steps_end_before_the_longest_time(node: Any) -> None:
 
 
 def test_steps_report_dropped_messages(node: Any) -> None:
-    node.transport.lost.update({("/scan", "/slow"): 3, ("/clock", "/slow"): 9})
+    lost = {("/scan", "/slow"): 3, ("/clock", "/slow"): 9, ("/odom", "/slow"): 1}
+    node.transport.lost.update(lost)
     answer = node.call("step_world", duration=0.0)
-    assert answer.message == "3 messages of /scan to /slow were dropped"
+    assert answer.message == (
+        "1 messages of /odom to /slow were dropped, 3 messages of /scan to /slow were dropped"
+    )
     assert (answer.success, answer.stamp) == (True, 5_000_000)
     assert node.call("step_world", duration=0.0).message == ""
-
-
-@pytest.mark.parametrize("rate", [-1.0, math.nan, -math.inf])
-def test_an_invalid_rate_is_refused(node: Any, rate: float) -> None:
-    answer = node.call("set_rate", update_rate=rate)
-    assert answer.message == f"update_rate must not be negative, got {rate}"
-    assert answer.success is False
-
-
-@pytest.mark.parametrize("seed", [-2, -(2**63)])
-def test_an_invalid_seed_is_refused(node: Any, seed: int) -> None:
-    answer = node.call("reset_world", seed=seed, keep_time=False)
-    assert answer.message == f"seed must be at least 0, or -1 for the current one, got {seed}"
-    assert answer.success is False
 
 
 class GridMessage(OccupancyGrid):
@@ -263,19 +330,43 @@ class GridMessage(OccupancyGrid):
         return self.cells.ravel()
 
 
-def test_a_map_of_one_cell_is_received(node: Any) -> None:
+def test_maps_are_received_and_read(node: Any, files: Any) -> None:
     grid = GridMessage((1.0, 2.0, 0.0), 0.5, np.full((1, 1), 100, np.int8))
-    assert node.call("set_layer_map", layer="2d", map_path="", grid=grid).success
-    assert len(node.world.layers[0].edges) == 4
-
-
-def test_invalid_requests(node: Any) -> None:
-    assert "in lockstep" in node.call("set_rate", update_rate=5.0).message
-    request = {"model": "a", "body": "", "color": [], "layers": [], "visible": 3}
-    assert node.call("set_appearance", **request).message == (
-        "visible must be 0 (KEEP), 1 (SHOW) or -1 (HIDE), got 3"
-    )
     empty = SimpleNamespace(data=[])
-    assert node.call("set_layer_map", layer="2d", map_path="", grid=empty).message == (
-        "exactly one of map_path and grid must be given"
-    )
+    request = {"layer": "2d", "map_path": ""}
+    assert node.call("set_layer_map", grid=grid, **request).success
+    assert len(node.world.layers[0].edges) == 4
+    request["map_path"] = files.write_map("room", ["#"])
+    assert node.call("set_layer_map", grid=empty, **request).success
+    assert len(node.world.layers[0].edges) == 4
+    for path, given in (("", empty), (request["map_path"], grid)):
+        answer = node.call("set_layer_map", layer="2d", map_path=path, grid=given)
+        assert answer.success is False
+        assert answer.message == "exactly one of map_path and grid must be given"
+
+
+@pytest.mark.parametrize(
+    ("service", "name", "values", "must"),
+    [
+        (
+            "wait_until_ready",
+            "timeout",
+            (-1.0, math.nan, math.inf),
+            "be finite and not negative [s]",
+        ),
+        ("set_rate", "update_rate", (-1.0, math.nan, -math.inf), "not be negative"),
+        ("reset_world", "seed", (-2, -(2**63)), "be at least 0, or -1 for the current one"),
+        ("set_appearance", "visible", (3,), "be 0 (KEEP), 1 (SHOW) or -1 (HIDE)"),
+    ],
+)
+def test_invalid_values_are_refused(
+    node: Any, service: str, name: str, values: Any, must: str
+) -> None:
+    others = {"topics": [], "keep_time": False, "model": "a", "body": "", "color": [], "layers": []}
+    for value in values:
+        answer = node.call(service, **others, **{name: value})
+        assert (answer.success, answer.message) == (False, f"{name} must {must}, got {value}")
+
+
+def test_the_rate_of_a_node_in_lockstep_cannot_be_set(node: Any) -> None:
+    assert "in lockstep" in node.call("set_rate", update_rate=5.0).message

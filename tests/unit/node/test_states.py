@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from waiting import TIMEOUT, wait_until
+from waiting import wait_until
 
 from flatland.errors import WorldError
 from flatland.node.states import PAUSED_RATE, PauseTopic, stamped_states
@@ -111,13 +110,3 @@ def test_the_pause_state_is_sent_once_for_each_change(files: Any, transport: Any
     assert topic.sent == [True, False]
     states.close()
     assert states._ticker.closed
-
-
-def test_a_subscriber_wakes_the_pause_state(files: Any, transport: Any) -> None:
-    posted = threading.Event()
-    world = files.load("{properties: {}, layers: [{name: 2d}]}")
-    simulation: Any = SimpleNamespace(world=world, post=lambda _action: posted.set())
-    states = PauseTopic(transport, simulation)
-    transport.topics["~paused"]._on_connection(True)
-    assert posted.wait(TIMEOUT)
-    states.close()

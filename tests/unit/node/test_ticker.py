@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import math
 import queue
@@ -137,27 +136,9 @@ def test_close_ends_the_thread_whatever_it_waits_for(loop: Loop, waits_for: str)
     ticker.close()
     thread.join(TIMEOUT)
     assert not thread.is_alive()
+    if waits_for == "loop":
+        loop.run_next()  # A tick that was posted before is skipped.
     assert len(loop.ticks) == (waits_for == "period")
-
-
-def test_tick_posted_before_close_is_skipped(loop: Loop, ticker: Ticker) -> None:
-    ticker.wake()
-    loop.wait_for_post()
-    ticker.close()
-    loop.run_next()
-    assert loop.ticks == []
-
-
-def test_exception_in_a_tick_does_not_end_the_ticker(loop: Loop) -> None:
-    def fail(_now: float) -> bool:
-        raise ValueError("expected")
-
-    ticker = Ticker("failing", RATE, loop.post, fail)
-    ticker.wake()
-    for _ in range(2):
-        with pytest.raises(ValueError, match="expected"):
-            loop.run_next()
-    ticker.close()
 
 
 # -- tickers of one thread ---------------------------------------------------------------------
@@ -226,8 +207,9 @@ def test_thread_ends_with_its_last_ticker(loop: Loop) -> None:
     assert not thread.is_alive()
 
 
-def test_exception_in_a_tick_does_not_affect_the_other_tickers(loop: Loop) -> None:
+def test_exceptions_in_ticks_affect_neither_their_ticker_nor_others(loop: Loop) -> None:
     thread = TickerThread("failing", loop.post)
+    errors: list[ValueError] = []
 
     def fail(_now: float) -> bool:
         raise ValueError("expected")
@@ -236,7 +218,10 @@ def test_exception_in_a_tick_does_not_affect_the_other_tickers(loop: Loop) -> No
     for ticker in tickers:
         ticker.wake()
     while len(loop.ticks) < 3:
-        with contextlib.suppress(ValueError):
+        try:
             loop.run_next()
+        except ValueError as error:
+            errors.append(error)
+    assert len(errors) > 1
     for ticker in tickers:
         ticker.close()

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import logging
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import flatland
-from flatland.recording import Replay
-from flatland.scene.world_scene import describe_world
 
 WORLD = """
 properties: {}
@@ -49,30 +46,13 @@ joints:
 """
 
 
-class Log(flatland.WorldObserver):
-    def __init__(self) -> None:
-        self.changed: list[str] = []
-
-    def model_changed(self, model: flatland.Model) -> None:
-        self.changed.append(model.name)
-
-
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    for name, text in (("world", WORLD), ("robot", ROBOT), ("box", BOX)):
-        (tmp_path / f"{name}.yaml").write_text(text)
-    return tmp_path
-
-
-@pytest.fixture
-def log() -> Log:
-    return Log()
-
-
-@pytest.fixture
-def world(folder: Path, log: Log) -> Any:
-    with flatland.World.from_yaml(folder / "world.yaml", seed=1, observers=[log]) as world:
-        yield world
+def world(files: Any, log: Any) -> Any:
+    files.write("robot.yaml", ROBOT)
+    files.write("box.yaml", BOX)
+    world = files.load(WORLD, observers=[log])
+    log.events.clear()
+    return world
 
 
 def ahead(world: Any) -> float:
@@ -89,7 +69,7 @@ def appearance(world: Any) -> list[Any]:
     ]
 
 
-def test_colours_and_visibility_of_one_body_and_of_all(world: Any, log: Log) -> None:
+def test_colours_and_visibility_of_one_body_and_of_all(world: Any, log: Any) -> None:
     base, lid = world.model("box").bodies
     world.set_appearance("box", "base", color=[0, 1, 0])
     assert base.color == (0, 1, 0, 0.25)
@@ -100,23 +80,13 @@ def test_colours_and_visibility_of_one_body_and_of_all(world: Any, log: Log) -> 
     world.set_appearance("box", "lid", visible=True)
     assert (base.visible, lid.visible) == (False, True)
     assert lid.color == (0.25, 0.5, 0.75, 1)
-    assert log.changed == ["box"] * 3
+    assert log.events == ["model_changed box"] * 3
 
 
-def test_a_hidden_body_is_not_drawn_but_hit(world: Any) -> None:
-    world.set_appearance("box", layers="high")
+def test_a_hidden_body_is_hit(world: Any) -> None:
+    """tests/unit/scene/test_description.py shows that it is not drawn."""
+    world.set_appearance("box", layers="high", visible=False)
     assert ahead(world) == pytest.approx(2, abs=1e-5)
-    shown = world.draw()
-    world.set_appearance("box", "base", visible=False)
-    scene = describe_world(world, None, scans=False)
-    shapes = [len(b.visible_shapes) for model in scene.models for b in model.bodies]
-    assert shapes == [1, 0, 2]
-    assert scene.models[1].joints == []
-    assert not np.array_equal(world.draw(), shown)
-    assert ahead(world) == pytest.approx(2, abs=1e-5)
-    world.set_appearance("box", visible=True)
-    world.model("box").set_pose(3, 0, 0)
-    assert len(describe_world(world, None, scans=False).models[1].joints) == 1
 
 
 def test_layers_change_what_lasers_detect(world: Any) -> None:
@@ -185,7 +155,7 @@ INVALID = "color must be [r, g, b] or [r, g, b, a], each from 0 to 1, got "
     ],
 )
 def test_invalid_requests_change_nothing(
-    world: Any, log: Log, arguments: dict[str, Any], text: str, hint: str
+    world: Any, log: Any, arguments: dict[str, Any], text: str, hint: str
 ) -> None:
     before = appearance(world)
     valid = {"model": "box", "color": [0, 0, 0, 1], "layers": ["high"], "visible": False}
@@ -195,7 +165,7 @@ def test_invalid_requests_change_nothing(
     assert str(caught.value).startswith("Flatland World: failed to change the appearance of model")
     assert caught.value.hint == hint
     assert appearance(world) == before
-    assert log.changed == []
+    assert log.events == []
 
 
 def test_a_reset_returns_to_the_model_file(world: Any) -> None:
@@ -205,7 +175,7 @@ def test_a_reset_returns_to_the_model_file(world: Any) -> None:
     assert (appearance(world), world.state_hash()) == (before, loaded)
 
 
-def test_snapshots_and_clones_contain_the_appearance(world: Any, log: Log) -> None:
+def test_snapshots_and_clones_contain_the_appearance(world: Any, log: Any) -> None:
     snapshot, before = world.snapshot(), appearance(world)
     world.set_appearance("box", color=[0, 0, 0, 1], layers=["high"], visible=False)
     changed, after = world.snapshot(), appearance(world)
@@ -213,44 +183,11 @@ def test_snapshots_and_clones_contain_the_appearance(world: Any, log: Log) -> No
         assert appearance(clone) == after
         clone.set_appearance("box", visible=True)
         assert appearance(world) == after
-    log.changed.clear()
+    log.events.clear()
     world.restore(snapshot)
     assert appearance(world) == before
-    assert log.changed == ["box"]
+    assert log.events == ["model_changed box"]
     world.restore(changed)
     assert appearance(world) == after
     world.restore(changed)
-    assert log.changed == ["box", "box"]
-
-
-def test_a_recording_repeats_the_change(folder: Path) -> None:
-    path = folder / "run.flog"
-    with flatland.World.from_yaml(folder / "world.yaml", seed=1) as world:
-        world.record(path)
-        world.step(3)
-        world.set_appearance("box", color=(0, 0, 0, 1), layers="high", visible=False)
-        world.move_model("robot", (3.5, 0, 0))
-        world.step(3)
-        world.set_appearance("robot", layers=["high"])
-        with pytest.raises(flatland.WorldError):
-            world.set_appearance("box", "none")
-        world.step(200)
-        expected, pose = appearance(world), world.model("robot").pose
-    replay = Replay(path)
-    replay.run()
-    assert replay.difference is None
-    assert appearance(replay.world) == expected
-    assert replay.world.model("robot").pose == pose != (3.5, 0, 0)
-    replay.world.close()
-
-
-def test_a_hook_changes_the_appearance_after_the_step(world: Any, log: Log) -> None:
-    class Changer(flatland.WorldObserver):
-        def time_advanced(self, time_ns: int) -> None:
-            world.remove_observer(self)
-            world.set_appearance("box", visible=False)
-            assert log.changed == []
-
-    world.add_observer(Changer())
-    world.step()
-    assert log.changed == ["box"]
+    assert log.events == ["model_changed box"] * 2

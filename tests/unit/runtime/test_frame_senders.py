@@ -52,15 +52,6 @@ def test_bodies_of_two_models_with_the_same_frames_conflict(files, empty_world, 
     assert '("exclude: [arm]" of "tf_a" or "exclude: [arm]" of "tf_b")' in text
 
 
-def test_two_models_with_the_same_frames_conflict(files, empty_world, caplog):
-    empty_world.spawn_model(model(files, "a", DRIVE), "a")
-    empty_world.spawn_model(model(files, "b", TF), "b")
-    empty_world.step(3)
-    (text,) = warnings(caplog)
-    assert '"odom" from Model Plugin "drive" type "DiffDrive" model "a"' in text
-    assert '"map" from Model Plugin "tf" type "ModelTfPublisher" model "b"' in text
-
-
 def test_each_pair_of_parents_of_a_frame_is_logged_once(files, empty_world, caplog):
     drive2 = DRIVE.replace("drive,", "drive2,").replace("base}", "base, odom_frame_id: odom2}")
     empty_world.spawn_model(model(files, "m", DRIVE, TF, drive2), "m")

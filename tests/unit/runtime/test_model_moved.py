@@ -39,21 +39,16 @@ def moves(world: flatland.World) -> Moves:
     return Moves(world.model("robot").plugin("sensor"))
 
 
-@pytest.mark.parametrize("keep", [False, True])
+@pytest.mark.parametrize(("options", "keep"), [({}, False), ({"keep_odometry": True}, True)])
 def test_receives_the_previous_poses_after_the_move(
-    world: flatland.World, moves: Moves, keep: bool
+    world: flatland.World, moves: Moves, options: dict[str, bool], keep: bool
 ) -> None:
-    world.move_model("robot", (3.0, 4.0, 0.5), keep_odometry=keep)
+    world.move_model("robot", (3.0, 4.0, 0.5), **options)
     ((previous, kept, pose),) = moves.calls
     assert previous["base"] == pytest.approx((0, 0, 0))
     assert previous["arm"] == pytest.approx((1, 0, 0))
     assert kept is keep
     assert pose == pytest.approx((3.0, 4.0, 0.5))
-
-
-def test_the_odometry_is_not_kept_by_default(world: flatland.World, moves: Moves) -> None:
-    world.move_model("robot", (3.0, 4.0, 0.5))
-    assert [keep for _, keep, _ in moves.calls] == [False]
 
 
 def test_is_not_called_for_other_models_and_failed_moves(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import flatland
@@ -22,22 +23,6 @@ DRIVEN += "plugins: [{type: DiffDrive, name: drive, body: b}]}"
 WALLS = "-5 -5 5 -5\n5 -5 5 5\n5 5 -5 5\n-5 5 -5 -5\n"
 
 
-class Log(flatland.WorldObserver):
-    """Records what observers are notified of."""
-
-    def __init__(self) -> None:
-        self.events: list[str] = []
-
-    def model_added(self, model: flatland.Model) -> None:
-        self.events.append(f"added {model.name}")
-
-    def model_moved(self, model: flatland.Model) -> None:
-        self.events.append(f"moved {model.name}")
-
-    def model_removed(self, model: flatland.Model) -> None:
-        self.events.append(f"removed {model.name}")
-
-
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "walls.dat").write_text(WALLS)
@@ -53,12 +38,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def log() -> Log:
-    return Log()
-
-
-@pytest.fixture
-def world(folder: Path, log: Log) -> Any:
+def world(folder: Path, log: Any) -> Any:
     with flatland.World.from_yaml(folder / "world.yaml", seed=1, observers=[log]) as world:
         world.step(3)
         log.events.clear()
@@ -85,12 +65,12 @@ class TestSpawn:
                 hashes.append(world.state_hash())
         assert hashes[0] == hashes[1]
 
-    def test_observers_are_notified_in_order(self, world: Any, log: Log) -> None:
+    def test_observers_are_notified_in_order(self, world: Any, log: Any) -> None:
         world.spawn_models(specs((-1, 0, 0), (-2, 0, 0)))
-        assert log.events == ["added m0", "added m1"]
+        assert log.events == ["model_added m0", "model_added m1"]
         assert world.spawn_models([]) == []
 
-    def test_a_failure_leaves_the_world_as_it_was(self, world: Any, log: Log) -> None:
+    def test_a_failure_leaves_the_world_as_it_was(self, world: Any, log: Any) -> None:
         before, topics = world.state_hash(), set(world.ports.outputs)
         wanted = [*specs((-1, 0, 0), (-2, 0, 0), path=DRIVEN), ModelSpec("none.yaml", "x")]
         with pytest.raises(BatchError, match=r"^Flatland World: models\[2\]: File does") as e:
@@ -99,7 +79,7 @@ class TestSpawn:
         assert isinstance(e.value.__cause__, flatland.YamlError)
         assert (world.state_hash(), set(world.ports.outputs)) == (before, topics)
         assert [model.name for model in world.models] == ["a"]
-        assert log.events == []
+        assert not any(event.startswith("model_") for event in log.events)
         world.spawn_models(wanted[:2])
 
     @pytest.mark.parametrize(
@@ -144,18 +124,6 @@ class TestSpawn:
         assert [Path(path).name for path in reads] == ["box.yaml"] + 5 * ["random.yaml"]
         assert len({model.bodies[0].color for model in world.models[-5:]}) == 5
 
-    def test_a_hook_spawns_after_the_step(self, world: Any, log: Log) -> None:
-        class Spawner(flatland.WorldObserver):
-            def time_advanced(self, time_ns: int) -> None:
-                world.remove_observer(self)
-                assert world.spawn_models(specs((-1, 0, 0))) is None
-                assert world.move_models({"m0": (-2, 0, 0)}) is None
-                assert log.events == []
-
-        world.add_observer(Spawner())
-        world.step()
-        assert log.events == ["added m0", "moved m0"]
-
 
 class TestText:
     @pytest.mark.parametrize("text", [TEXT, "\r" + BOX, DRIVEN])
@@ -194,7 +162,7 @@ class TestText:
 
 class TestMove:
     @pytest.fixture
-    def boxes(self, world: Any, log: Log) -> Any:
+    def boxes(self, world: Any, log: Any) -> Any:
         world.spawn_models(specs((-1, 0, 0), (-2, 0, 0), (-3, 0, 0)))
         for model in world.models:
             model.bodies[0].set_velocity(0.1, 0.2, 0.3)
@@ -202,14 +170,14 @@ class TestMove:
         log.events.clear()
         return world
 
-    def test_all_models_move(self, boxes: Any, log: Log) -> None:
+    def test_all_models_move(self, boxes: Any, log: Any) -> None:
         poses = {"m0": (1, -1, 0), "m2": (2, -2, 1)}
         models = boxes.move_models(poses)
         assert [model.name for model in models] == ["m0", "m2"]
         assert models[0].pose == (1, -1, 0)
         assert models[1].pose == pytest.approx((2, -2, 1), abs=1e-6)
         assert models[1].bodies[0].velocity == (0, 0, 0)
-        assert log.events == ["moved m0", "moved m2"]
+        assert log.events == ["model_moved m0", "model_moved m2"]
         assert boxes.move_models([]) == []
         with pytest.raises(ValueError, match="if_blocked must be one of"):
             boxes.move_models({}, if_blocked="maybe")
@@ -243,7 +211,7 @@ class TestMove:
         ],
     )
     def test_a_failure_moves_everything_back_exactly(
-        self, boxes: Any, log: Log, pairs: Any, mode: Any, index: int, text: str
+        self, boxes: Any, log: Any, pairs: Any, mode: Any, index: int, text: str
     ) -> None:
         before = boxes.state_hash()
         motions = boxes.physics.body_states().tobytes()
@@ -253,21 +221,6 @@ class TestMove:
         assert boxes.physics.body_states().tobytes() == motions
         assert boxes.state_hash() == before
         assert log.events == []
-
-    def test_the_run_continues_as_without_the_failure(self, folder: Path) -> None:
-        states = []
-        for fails in (False, True):
-            with flatland.World.from_yaml(folder / "world.yaml", seed=1) as world:
-                world.spawn_models(specs((-1, 0, 0.2), (-2, 0, 0)))
-                for model in world.models:
-                    model.bodies[0].set_velocity(-1, 0.2, 0.3)
-                world.step(50)
-                if fails:
-                    with pytest.raises(BatchError):
-                        world.move_models({"m0": (3, 3, 0), "m1": (1, 1, 0)}, "refuse")
-                world.step(200)
-                states.append(world.physics.body_states().tobytes())
-        assert states[0] == states[1]
 
     def test_a_sleeping_model_sleeps_after_a_failure(self, boxes: Any) -> None:
         boxes.model("m0").bodies[0].awake = False
@@ -285,11 +238,11 @@ class TestMove:
 
 
 class TestDelete:
-    def test_all_models_are_deleted(self, world: Any, log: Log) -> None:
+    def test_all_models_are_deleted(self, world: Any, log: Any) -> None:
         world.spawn_models(specs((-1, 0, 0), (-2, 0, 0)))
         world.delete_models(["m1", "a"])
         assert [model.name for model in world.models] == ["m0"]
-        assert log.events[2:] == ["removed m1", "removed a"]
+        assert log.events[2:] == ["model_removed m1", "model_removed a"]
         world.delete_models([])
 
     @pytest.mark.parametrize(
@@ -297,7 +250,7 @@ class TestDelete:
         [(["a", "ghost"], 1, '"ghost" does not exist'), (["a", "a"], 1, '"a" occurs twice')],
     )
     def test_a_failure_deletes_nothing(
-        self, world: Any, log: Log, names: list[str], index: int, text: str
+        self, world: Any, log: Any, names: list[str], index: int, text: str
     ) -> None:
         before = world.state_hash()
         with pytest.raises(BatchError, match=rf"names\[{index}\]: .*{text}"):
@@ -306,20 +259,35 @@ class TestDelete:
         assert log.events == []
 
 
-def test_a_recording_repeats_requests_of_several_models(folder: Path) -> None:
+def test_a_recording_repeats_all_kinds_of_changes(folder: Path) -> None:
+    """tests/unit/recording/test_replay.py repeats those of single models."""
     path = folder / "run.flog"
     with flatland.World.from_yaml(folder / "world.yaml", seed=1) as world:
         world.record(path)
         world.spawn_models(specs((-1, 0, 0), (-2, 0, 0), path=TEXT))
+        world.set_appearance("m0", color=(0, 0, 0, 1), layers="2d", visible=False)
         world.step(3)
         world.move_models({"m0": (2, -2, 0), "a": (-3, 3, 1)})
-        with pytest.raises(BatchError):
-            world.delete_models(["m0", "ghost"])
+        cells = np.zeros((9, 9), np.int8)
+        cells[4, 4] = 100
+        world.set_layer_map("2d", flatland.OccupancyGrid((2, -2, 0), 0.1, cells))
+        for change in (
+            lambda: world.delete_models(["m0", "ghost"]),
+            lambda: world.set_appearance("a", "none"),
+            lambda: world.set_layer_map("2d", "none.yaml"),
+        ):
+            with pytest.raises(flatland.FlatlandError):
+                change()
         world.step(3)
         world.delete_models(["m1", "a"])
-        world.step(3)
+        world.step(50)
+        pose, color = world.model("m0").pose, world.model("m0").bodies[0].color
     replay = Replay(path)
     replay.run()
     assert replay.difference is None
     assert [model.name for model in replay.world.models] == ["m0"]
+    body = replay.world.model("m0").bodies[0]
+    assert (body.pose, body.color, body.visible) == (pose, color, False)
+    assert pose != (2, -2, 0)  # the new wall is within the box
+    assert len(replay.world.layer("2d").edges) == 4
     replay.world.close()

@@ -7,18 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flatland.runtime.nearest_place import SEARCH_RADIUS, BoolArray, DoubleArray, nearest_offset
-
-
-def test_offset_out_of_a_disc() -> None:
-    def is_free(offsets: DoubleArray) -> BoolArray:
-        return np.hypot(offsets[:, 0] - 0.3, offsets[:, 1] + 0.1) >= 1.0
-
-    offset = nearest_offset(is_free)
-    assert offset is not None
-    # The shortest offset is radial; its length is the distance to the rim.
-    assert math.hypot(*offset) == pytest.approx(1 - math.hypot(0.3, 0.1), abs=0.005)
-    assert is_free(np.array([offset]))[0]
+from flatland.runtime.nearest_place import SEARCH_RADIUS, nearest_offset
 
 
 @pytest.mark.parametrize("angle", np.linspace(0, math.tau, 12, endpoint=False))
@@ -51,10 +40,6 @@ def test_the_search_radius_is_limited(distance: float, is_found: bool) -> None:
     assert (offset is not None) is is_found
     if offset is not None:
         assert math.hypot(*offset) <= SEARCH_RADIUS
-
-
-def test_none_is_returned_without_a_free_place() -> None:
-    assert nearest_offset(lambda o: np.zeros(len(o), bool)) is None
 
 
 def test_offset_into_a_small_disc() -> None:

@@ -86,10 +86,11 @@ def test_a_removed_observer_receives_no_more_notifications(files: Any) -> None:
         world.remove_observer(removed)
 
 
-CONTAINED = [event for event in EVENTS if event not in ("attached", "output_opened")]
+REJECTIONS = ("output_opened", "command_opened")
+CONTAINED = [event for event in EVENTS if event not in ("attached", *REJECTIONS)]
 
 
-@pytest.mark.parametrize("event", [e for e in CONTAINED if e != "command_opened"])
+@pytest.mark.parametrize("event", CONTAINED)
 def test_an_exception_of_an_observer_is_logged_and_has_no_effect(
     files: Any, caplog: pytest.LogCaptureFixture, event: str
 ) -> None:
@@ -103,7 +104,7 @@ def test_an_exception_of_an_observer_is_logged_and_has_no_effect(
     assert f"RuntimeError: {event} is broken" in caplog.text
 
 
-@pytest.mark.parametrize("event", [e for e in CONTAINED if e != "command_opened"])
+@pytest.mark.parametrize("event", CONTAINED)
 def test_an_exception_of_an_observer_is_raised_by_the_next_step_or_close(
     files: Any, event: str
 ) -> None:
@@ -125,7 +126,7 @@ def test_an_exception_of_an_observer_is_raised_by_the_next_step_or_close(
         assert notes == [f"raised by observer Recorder: {event}"]
 
 
-@pytest.mark.parametrize("event", ["output_opened", "command_opened"])
+@pytest.mark.parametrize("event", REJECTIONS)
 def test_a_rejected_port_fails_the_model_and_other_observers_are_notified(
     files: Any, event: str
 ) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import math
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -80,6 +79,11 @@ def test_warn_is_the_default_and_names_all_overlapped_models_and_layers(
     assert warnings_of(caplog)[1:] == [text + "(4.810, 0.000, 0.000)"]
     assert model.pose == pytest.approx((4.81, 0.0, 0.0))
     assert model.displacement == (0.0, 0.0)
+    caplog.clear()
+    spawn(world, "minimal", "third", (5, 0, 0), if_blocked="allow")
+    world.move_model("third", (-5, 0, 0), if_blocked="allow")
+    assert world.model("third").pose == pytest.approx((-5, 0, 0))
+    assert warnings_of(caplog) == []
 
 
 def test_the_overlap_of_a_model_is_a_text(world: flatland.World) -> None:
@@ -99,13 +103,6 @@ def test_an_unknown_choice_is_refused_before_anything_changes(world: flatland.Wo
     with pytest.raises(ValueError, match=r"if_blocked must be one of .*, got 'maybe'"):
         world.move_model("m", (1, 0, 0), if_blocked="maybe")
     assert world.model("m").pose == (0.0, 0.0, 0.0)
-
-
-def test_allow_logs_nothing(world: flatland.World, caplog: pytest.LogCaptureFixture) -> None:
-    model = spawn(world, "minimal", "m", (5, 0, 0), if_blocked="allow")
-    world.move_model("m", (-5, 0, 0), if_blocked="allow")
-    assert model.pose == pytest.approx((-5, 0, 0))
-    assert warnings_of(caplog) == []
 
 
 def test_refuse_leaves_the_world_unchanged(world: flatland.World) -> None:
@@ -129,19 +126,13 @@ def test_refuse_leaves_the_world_unchanged(world: flatland.World) -> None:
     assert first.pose == pytest.approx((1.1, 0, 0))
 
 
-def test_a_failed_spawn_logs_no_warning(
+def test_a_failed_spawn_logs_no_warning_and_a_refused_one_starts_no_plugin(
     world: flatland.World, files: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     files.write("bad.model.yaml", CRATE + "plugins: [{name: p, type: Missing}]\n")
     with pytest.raises(PluginError):
         spawn(world, "bad", "m", (5, 0, 0))
     assert warnings_of(caplog) == []
-
-
-def test_a_refused_model_starts_no_plugin(world: flatland.World, files: Any) -> None:
-    files.write("bad.model.yaml", CRATE + "plugins: [{name: p, type: Missing}]\n")
-    with pytest.raises(PluginError):
-        spawn(world, "bad", "m", (0, 0, 0), if_blocked="refuse")
     with pytest.raises(WorldError, match="it overlaps"):
         spawn(world, "bad", "m", (5, 0, 0), if_blocked="refuse")
     assert world.models == []
@@ -170,17 +161,6 @@ def test_nearest_to_walls(
     assert model.displacement == (0.0, 0.0)
     world.move_model("m", requested, if_blocked="nearest")
     assert math.hypot(*model.displacement) == pytest.approx(distance, abs=0.006)
-
-
-def test_nearest_among_crates_is_between_them(world: flatland.World) -> None:
-    """The nearest free place in a ring of crates is the hole in its middle."""
-    for i, (x, y) in enumerate(
-        [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)]
-    ):
-        spawn(world, "crate", f"c{i}", (x, y, 0), if_blocked="refuse")
-    model = spawn(world, "minimal", "m", (0.4, 0.4, 0), if_blocked="nearest")
-    # A disc of radius 0.2 in a hole from -0.5 to 0.5.
-    assert model.pose == pytest.approx((0.3, 0.3, 0), abs=0.005)
 
 
 def test_nearest_moves_all_bodies(world: flatland.World) -> None:
@@ -306,32 +286,6 @@ def test_is_free(
         assert world.is_free(pose, **options) is free
 
 
-@pytest.mark.parametrize(
-    ("pose", "options", "error", "text"),
-    [
-        ((0, 0), {}, ValueError, "requires either a radius or a model"),
-        ((0, 0), {"radius": 1, "model": "m"}, ValueError, "requires either a radius or a model"),
-        ((0, math.nan), {"radius": 1}, ValueError, "pose must be finite"),
-        ((0, 1, 2, 3), {"radius": 1}, ValueError, "pose must be three numbers"),
-        ((0, 0), {"radius": -1}, ValueError, "radius must be finite and not negative"),
-        ((0, 0), {"radius": 1, "clearance": math.inf}, ValueError, "clearance must be finite"),
-        ((0, 0), {"model": "x"}, WorldError, 'model with name "x" does not exist'),
-        ((0, 0), {"radius": 1, "ignore": "x"}, WorldError, 'model with name "x" does not exist'),
-        ((0, 0), {"radius": 1, "layers": "x"}, WorldError, 'layer with name "x" does not exist'),
-    ],
-)
-def test_invalid_arguments_of_is_free_raise(
-    world: flatland.World,
-    pose: tuple[float, ...],
-    options: dict[str, Any],
-    error: type[Exception],
-    text: str,
-) -> None:
-    spawn(world, "minimal", "m", (0, 0, 0))
-    with pytest.raises(error, match=text):
-        world.is_free(pose, **options)
-
-
 # -- sample_free --------------------------------------------------------------------------------
 
 
@@ -433,21 +387,31 @@ def test_a_place_that_just_fits_is_found(world: flatland.World) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "options", "text"),
+    ("call", "error", "text"),
     [
-        ((-1, 0.3), {}, "n must not be negative"),
-        ((1, 0), {}, "radius must be positive"),
-        ((1, math.nan), {}, "radius must be finite"),
-        ((1, 0.3, -0.1), {}, "clearance must be finite and not negative"),
-        ((1, 0.3), {"bounds": (0, 0, 0, 1)}, "bounds must be"),
-        ((1, 0.3), {"connected_to": (0, math.inf)}, "must be finite"),
+        (lambda w: w.is_free((0, 0)), ValueError, "requires either a radius or a model"),
+        (lambda w: w.is_free((0, 0), 1, model="m"), ValueError, "requires either a radius or a"),
+        (lambda w: w.is_free((0, math.nan), 1), ValueError, "pose must be finite"),
+        (lambda w: w.is_free((0, 1, 2, 3), 1), ValueError, "pose must be three numbers"),
+        (lambda w: w.is_free((0, 0), -1), ValueError, "radius must be finite and not negative"),
+        (lambda w: w.is_free((0, 0), 1, clearance=math.inf), ValueError, "clearance must be fin"),
+        (lambda w: w.is_free((0, 0), model="x"), WorldError, 'model with name "x" does not exist'),
+        (lambda w: w.is_free((0, 0), 1, ignore="x"), WorldError, 'model with name "x" does not'),
+        (lambda w: w.is_free((0, 0), 1, layers="x"), WorldError, 'layer with name "x" does not'),
+        (lambda w: w.sample_free(-1, 0.3), ValueError, "n must not be negative"),
+        (lambda w: w.sample_free(1, 0), ValueError, "radius must be positive"),
+        (lambda w: w.sample_free(1, math.nan), ValueError, "radius must be finite"),
+        (lambda w: w.sample_free(1, 0.3, -0.1), ValueError, "clearance must be finite and not neg"),
+        (lambda w: w.sample_free(1, 0.3, bounds=(0, 0, 0, 1)), ValueError, "bounds must be"),
+        (lambda w: w.sample_free(1, 0.3, connected_to=(0, math.inf)), ValueError, "must be finite"),
     ],
 )
-def test_invalid_arguments_of_sample_free_raise(
-    world: flatland.World, arguments: Any, options: dict[str, Any], text: str
+def test_invalid_arguments_raise(
+    world: flatland.World, call: Any, error: type[Exception], text: str
 ) -> None:
-    with pytest.raises(ValueError, match=text):
-        world.sample_free(*arguments, **options)
+    spawn(world, "minimal", "m", (0, 0, 0))
+    with pytest.raises(error, match=text):
+        call(world)
 
 
 def test_a_world_without_walls_requires_bounds(empty_world: flatland.World) -> None:
@@ -455,21 +419,3 @@ def test_a_world_without_walls_requires_bounds(empty_world: flatland.World) -> N
         empty_world.sample_free(3, 0.3)
     poses = empty_world.sample_free(9, 0.3, 0.0, 1, bounds=(-2, 3, 2, 5), connected_to=(0, 4))
     check_samples(empty_world, poses, 9, 0.3, 0.0)
-
-
-def test_samples_in_the_office_are_all_in_rooms(checkout: Path) -> None:
-    """All places that a robot can reach are inside the building and beside its tables."""
-    with flatland.World.from_yaml(checkout / "worlds/office/world.yaml", seed=1) as world:
-        x, y, _ = world.model("robot").pose
-        poses = world.sample_free(50, 0.25, 0.1, rng=2, connected_to=(x, y))
-        check_samples(world, poses, 50, 0.25, 0.1)
-        walls = world.layer("walls")
-        corners = walls.edges.reshape(-1, 2) + walls.body.pose[:2]
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        assert (poses[:, :2] > low + 0.35 - 1e-4).all()
-        assert (poses[:, :2] < high - 0.35 + 1e-4).all()
-        assert world.is_free(poses[0], radius=0.25)
-        everywhere = world.sample_free(200, 0.05, rng=2)
-        reached = world.sample_free(200, 0.05, rng=2, connected_to=(x, y))
-        # Without `connected_to`, places within thick walls and shafts are drawn too.
-        assert not np.array_equal(everywhere, reached)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import logging
 import re
 import sys
@@ -11,7 +10,7 @@ import threading
 import pytest
 
 import flatland
-from flatland import PluginError, WorldLockedError
+from flatland import ModelPlugin, PluginError, WorldLockedError, WorldPlugin
 
 HOOKS = [
     "before_physics_step",
@@ -21,17 +20,6 @@ HOOKS = [
     "after_physics_step",
     "end_contact",
 ]
-PLUGINS = '''
-import sys
-import threading
-import time
-
-from flatland import ModelPlugin, WorldPlugin
-
-HOOKS = {hooks}
-woken = threading.Event()
-started = []
-exits_when_created = False
 
 
 class _Faulty:
@@ -48,19 +36,7 @@ class _Faulty:
 
     def fail(self, *arguments):
         self.calls += 1
-        raise self.fault(f"fault {{self.calls}}")
-
-
-class Recovering(ModelPlugin):
-    """Succeeds in each third call."""
-
-    def on_initialize(self, config):
-        self.calls = 0
-
-    def before_physics_step(self, timekeeper):
-        self.calls += 1
-        if self.calls % 3:
-            raise RuntimeError("once more")
+        raise self.fault(f"fault {self.calls}")
 
 
 class Model(_Faulty, ModelPlugin):
@@ -75,11 +51,23 @@ class Exiting(_Faulty, ModelPlugin):
     """Raises the exception of `sys.exit`."""
 
     start_fault = fault = SystemExit
+    exits_when_created = False
 
     def __init__(self):
         super().__init__()
-        if exits_when_created:
+        if self.exits_when_created:
             sys.exit(3)
+
+
+class Recovering(ModelPlugin):
+    """Succeeds in each third call."""
+
+    calls = 0
+
+    def before_physics_step(self, timekeeper):
+        self.calls += 1
+        if self.calls % 3:
+            raise RuntimeError("once more")
 
 
 class Witness(ModelPlugin):
@@ -127,48 +115,22 @@ class FaultyCount(ModelPlugin):
         raise RuntimeError("no count")
 
 
-class FaultyShutdown(ModelPlugin):
-    def on_shutdown(self):
-        raise RuntimeError("cannot shut down")
+class Starting(ModelPlugin):
+    """Calls the function `act` of the test in `on_initialize`."""
 
+    act = None
 
-class ThreadRecorder(ModelPlugin):
     def on_initialize(self, config):
-        self.thread = threading.current_thread()
-
-
-class Stepping(ModelPlugin):
-    def on_initialize(self, config):
-        self.world.step()
-
-
-class Closing(ModelPlugin):
-    def on_initialize(self, config):
-        self.world.close()
-
-
-class Looping(ModelPlugin):
-    def on_initialize(self, config):
-        started.append(self)
-        self.output("early", float)
-        while True:
-            time.sleep(0.001)
-
-
-class Blocking(ModelPlugin):
-    def on_initialize(self, config):
-        started.append(self)
-        self.output("early", float)
-        woken.wait()  # a lock, taken in C
-        self.output("late", float)
+        self.act()
 
 
 class Acting(ModelPlugin):
     """Calls the function `act` of the test in `pre_solve`, and stores its exception."""
 
+    act = None
+
     def on_initialize(self, config):
         self.errors = []
-        self.act = None
 
     def pre_solve(self, contact, old_manifold):
         if self.act is not None:
@@ -177,29 +139,19 @@ class Acting(ModelPlugin):
             except Exception as error:
                 self.errors.append(error)
                 raise
-'''
-BASES = {"World": "World"}  # of the classes above; all others are model plugins
-ENTRY = '<class name="faults::{name}" type="{type}" base_class_type="flatland::{base}Plugin"/>'
+
+
 ROBOT = "bodies: [{name: base, footprints: [{type: circle, radius: 0.5, density: 1}]}]\nplugins:\n"
 
 
-@pytest.fixture
-def faults(files, monkeypatch, request, caplog):
-    """Faulty plugins named `faults::...`, found by manifest; returns the name of their module."""
-    module = f"faults_{abs(hash(request.node.nodeid))}"
-    files.write(f"src/{module}.py", PLUGINS.format(hooks=HOOKS))
-    entries = [
-        ENTRY.format(name=name, type=f"{module}.{name}", base=BASES.get(name, "Model"))
-        for name in re.findall(r"^class ([A-Z]\w*)", PLUGINS, re.MULTILINE)
-    ]
-    manifest = files.write("faults.xml", '<library path="src">' + "".join(entries) + "</library>")
-    monkeypatch.setenv("FLATLAND_PLUGIN_PATH", manifest)
-    monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
-    monkeypatch.setattr(sys, "path", list(sys.path))
+@pytest.fixture(autouse=True)
+def _plugins(declare_plugins, caplog):
+    """Declares the plugins of this module."""
+    declare_plugins(
+        *(Model, World, Exiting, Recovering, Witness, FaultyDrive, Deleting, FaultyCount),
+        *(Starting, Acting),
+    )
     caplog.set_level(logging.ERROR, "flatland")
-    yield module
-    if module in sys.modules:
-        sys.modules.pop(module).woken.set()
 
 
 def robot(files, *plugins, name="robot.model.yaml"):
@@ -207,7 +159,19 @@ def robot(files, *plugins, name="robot.model.yaml"):
     return files.write(name, ROBOT + "".join(f"  - {{{entry}}}\n" for entry in plugins))
 
 
-WITNESS = 'name: witness, type: "faults::Witness"'
+WITNESS = 'name: witness, type: "test::Witness"'
+
+
+def bad(kind, hook=""):
+    """Returns the entry of a plugin, which raises in a hook."""
+    return f'name: bad, type: "test::{kind}"' + (f", hook: {hook}" if hook else "")
+
+
+def alone(files, plugin, **options):
+    """Loads a world with one robot `r`, which has one plugin."""
+    robot(files, plugin)
+    text = "{properties: {}, layers: [{name: 2d}], models: [{name: r, model: robot.model.yaml}]}"
+    return files.load(text, **options)
 
 
 def crowded(files, *plugins, world_plugins="[]", **options):
@@ -228,42 +192,45 @@ def crowded(files, *plugins, world_plugins="[]", **options):
     )
 
 
-def witness(world, model="robot"):
-    return world.model(model).plugin("witness").calls
-
-
 def run_all_hooks(world):
-    """Runs every hook more than three times."""
+    """Runs every hook more than three times, which the witness confirms."""
     world.step(4)
     world.move_model("robot", (20, 0, 0))
     world.step(4)
+    assert all(count > 3 for count in world.model("robot").plugin("witness").calls.values())
 
 
-@pytest.mark.parametrize("hook", HOOKS)
-@pytest.mark.parametrize("kind", ["Model", "World"])
-def test_a_hook_that_always_raises_is_called_three_times(files, faults, caplog, kind, hook):
-    if kind == "Model":
-        world = crowded(files, f'name: bad, type: "faults::Model", hook: {hook}')
-        bad = world.model("robot").plugin("bad")
-        place = 'Model Plugin "bad" type "faults::Model" model "robot"'
+def robots(world):
+    return [model.name for model in world.models if "disc" not in model.name]
+
+
+@pytest.mark.parametrize(
+    ("kind", "hook"),
+    [
+        *((kind, hook) for kind in ("Model", "World") for hook in HOOKS),
+        *(("Exiting", hook) for hook in ("before_physics_step", "pre_solve")),
+    ],
+)
+def test_a_hook_that_always_raises_is_called_three_times(files, caplog, kind, hook):
+    if kind == "World":
+        world = crowded(files, world_plugins=f"[{{{bad(kind, hook)}}}]")
+        [plugin] = world.plugins
+        place = 'World Plugin "bad" type "test::World"'
     else:
-        world = crowded(
-            files, world_plugins=f'[{{name: bad, type: "faults::World", hook: {hook}}}]'
-        )
-        [bad] = world.plugins
-        place = 'World Plugin "bad" type "faults::World"'
+        world = crowded(files, bad(kind, hook))
+        plugin = world.model("robot").plugin("bad")
+        place = f'Model Plugin "bad" type "test::{kind}" model "robot"'
     run_all_hooks(world)
-    assert bad.calls == 3
+    assert plugin.calls == 3
     errors = [record.getMessage() for record in caplog.records if record.name == "flatland"][-2:]
     assert errors == [
         f"{place}: {hook} raised",
         f"{place}: {hook} raised 3 times in a row, the plugin is disabled",
     ]
     # The traceback of the first exception; the other two are throttled.
-    assert "RuntimeError: fault 1" in caplog.text
+    assert f"{type(plugin).fault.__name__}: fault 1" in caplog.text
     assert "in fail" in caplog.text
     assert "fault 2" not in caplog.text
-    assert all(count > 3 for count in witness(world).values())
     assert world.time == pytest.approx(8 * 0.005)
     # Box2D is not locked, and the faulty plugin is removed like any other.
     world.spawn_model("minimal.model.yaml", "new", pose=(0, 9, 0))
@@ -271,12 +238,8 @@ def test_a_hook_that_always_raises_is_called_three_times(files, faults, caplog, 
     world.step()
 
 
-def test_a_disabled_plugin_no_longer_drives_its_robot(files, faults):
-    robot(files, 'name: bad, type: "faults::FaultyDrive"')
-    world = files.load(
-        "{properties: {}, layers: [], models: [{name: r, model: robot.model.yaml}]}",
-        plugin_errors="disable",
-    )
+def test_a_disabled_plugin_no_longer_drives_its_robot(files):
+    world = alone(files, bad("FaultyDrive"), plugin_errors="disable")
     body = world.model("r").bodies[0]
     world.step(3)
     assert body.velocity == pytest.approx((1.0, 0.0, 0.0))
@@ -285,205 +248,197 @@ def test_a_disabled_plugin_no_longer_drives_its_robot(files, faults):
     assert body.velocity == pytest.approx((0.25, 0.0, 0.0))
 
 
-def test_a_request_of_a_hook_that_fails_is_logged(files, faults, caplog):
-    world = crowded(files, 'name: bad, type: "faults::Deleting"')
+def test_a_request_of_a_hook_that_fails_is_logged(files, caplog):
+    world = crowded(files, bad("Deleting"))
     world.step()
     text = [record.getMessage() for record in caplog.records][-2:]
     assert text[0].startswith('delete_model "nobody": Flatland World: ')
     assert text[1].startswith("delete_models: Flatland World: ")
 
 
-def test_a_plugin_that_fails_to_account_for_skipped_updates_is_reported(files, faults, caplog):
-    world = crowded(files, 'name: bad, type: "faults::FaultyCount"')
+def test_a_plugin_that_fails_to_account_for_skipped_updates_is_reported(files, caplog):
+    world = crowded(files, bad("FaultyCount"))
     world.step(3)
     world.state_hash()  # for which all updates are accounted for
-    assert 'type "faults::FaultyCount" model "robot": after_physics_step raised' in caplog.text
+    assert 'type "test::FaultyCount" model "robot": after_physics_step raised' in caplog.text
     assert "RuntimeError: no count" in caplog.text
 
 
-def test_a_hook_that_succeeds_in_between_is_not_disabled(files, faults):
-    world = crowded(files, 'name: bad, type: "faults::Recovering"')
+def test_a_hook_that_succeeds_in_between_is_not_disabled(files):
+    world = crowded(files, bad("Recovering"))
     world.step(12)
     assert world.model("robot").plugin("bad").calls == 12
     assert not world.plugin_host.disabled
 
 
-@pytest.mark.parametrize("hook", [*HOOKS, "on_shutdown"])
-def test_a_plugin_that_exits_does_not_end_the_program(files, faults, caplog, hook):
-    world = crowded(files, f'name: bad, type: "faults::Exiting", hook: {hook}')
-    bad = world.model("robot").plugin("bad")
-    run_all_hooks(world)
-    assert bad.calls == (0 if hook == "on_shutdown" else 3)
-    assert all(count > 3 for count in witness(world).values())
-    world.delete_model("robot")
-    assert f'model "robot": {hook} raised' in caplog.text
-    assert "SystemExit: fault 1" in caplog.text
-
-
 @pytest.mark.parametrize("timeout", [None, 10])
-def test_a_plugin_that_exits_during_initialization_fails_only_its_model(files, faults, timeout):
+def test_a_plugin_that_exits_during_initialization_fails_only_its_model(
+    files, monkeypatch, timeout
+):
     world = crowded(files, plugin_timeout=timeout)
-    entry = 'name: bad, type: "faults::Exiting", hook: on_initialize'
-    robot(files, WITNESS, entry, name="bad.yaml")
+    robot(files, WITNESS, bad("Exiting", "on_initialize"), name="bad.yaml")
     with pytest.raises(PluginError, match=r'model "second": SystemExit no device \['):
         world.spawn_model("bad.yaml", "second")
-    importlib.import_module(faults).exits_when_created = True
+    monkeypatch.setattr(Exiting, "exits_when_created", True)
     with pytest.raises(PluginError, match=r'Exiting" cannot be instantiated: SystemExit: 3 \['):
         world.spawn_model("bad.yaml", "second")
     run_all_hooks(world)
-    assert all(count > 3 for count in witness(world).values())
 
 
-def test_a_plugin_that_raises_in_on_initialize_fails_only_its_model(files, faults):
+def test_a_plugin_that_raises_in_on_initialize_fails_only_its_model(files):
     world = crowded(files)
-    robot(files, WITNESS, 'name: bad, type: "faults::Model", hook: on_initialize', name="bad.yaml")
+    robot(files, WITNESS, bad("Model", "on_initialize"), name="bad.yaml")
     with pytest.raises(PluginError) as caught:
         world.spawn_model("bad.yaml", "second")
     assert re.fullmatch(
-        'Flatland plugin: Model Plugin "bad" type "faults::Model" model "second": no device'
+        'Flatland plugin: Model Plugin "bad" type "test::Model" model "second": no device'
         r" \[.*bad\.yaml:\d+\]",
         str(caught.value),
     )
     assert isinstance(caught.value.__cause__, ValueError)
-    assert [model.name for model in world.models if "disc" not in model.name] == ["robot"]
+    assert robots(world) == ["robot"]
     run_all_hooks(world)
-    assert all(count > 3 for count in witness(world).values())
 
 
-def test_an_interrupt_during_initialization_is_raised_and_leaves_no_model(files, faults):
+def test_an_interrupt_during_initialization_is_raised_and_leaves_no_model(files, monkeypatch):
     world = crowded(files)
-    importlib.import_module(faults).Model.start_fault = KeyboardInterrupt
-    robot(files, WITNESS, 'name: bad, type: "faults::Model", hook: on_initialize', name="bad.yaml")
+    monkeypatch.setattr(Model, "start_fault", KeyboardInterrupt)
+    robot(files, WITNESS, bad("Model", "on_initialize"), name="bad.yaml")
     with pytest.raises(KeyboardInterrupt, match="no device"):
         world.spawn_model("bad.yaml", "second")
-    assert [model.name for model in world.models if "disc" not in model.name] == ["robot"]
+    assert robots(world) == ["robot"]
     run_all_hooks(world)
 
 
-def test_a_world_plugin_that_raises_in_on_initialize_fails_the_world(files, faults):
+def test_a_world_plugin_that_raises_in_on_initialize_fails_the_world(files):
     with pytest.raises(PluginError) as caught:
-        crowded(files, world_plugins='[{name: bad, type: "faults::World", hook: on_initialize}]')
+        crowded(files, world_plugins=f"[{{{bad('World', 'on_initialize')}}}]")
     assert re.fullmatch(
-        'Flatland plugin: World Plugin "bad" type "faults::World": no device'
+        'Flatland plugin: World Plugin "bad" type "test::World": no device'
         r" \[.*world\.yaml:\d+\]",
         str(caught.value),
     )
     assert isinstance(caught.value.__cause__, ValueError)
 
 
-def test_a_plugin_that_raises_in_on_shutdown_is_removed(files, faults, caplog):
-    world = crowded(files, 'name: bad, type: "faults::FaultyShutdown"')
+@pytest.mark.parametrize("kind", ["Model", "Exiting"])
+def test_a_plugin_that_raises_in_on_shutdown_is_removed(files, caplog, kind):
+    world = crowded(files, bad(kind, "on_shutdown"))
     body = world.model("robot").body("base")
     other = world.model("robot").plugin("witness")
     world.delete_model("robot")
-    assert (
-        'Model Plugin "bad" type "faults::FaultyShutdown" model "robot": on_shutdown raised'
-        in caplog.text
-    )
-    assert "RuntimeError: cannot shut down" in caplog.text
+    assert f'"bad" type "test::{kind}" model "robot": on_shutdown raised' in caplog.text
+    assert ("SystemExit" if kind == "Exiting" else "RuntimeError") + ": fault 1" in caplog.text
     assert other.calls is None
     assert not body.physics.alive
     world.step()
     assert world.contacts == []
 
 
-@pytest.mark.parametrize("which", ["Looping", "Blocking"])
-def test_a_plugin_whose_on_initialize_does_not_return_is_interrupted(files, faults, which):
+def test_a_plugin_whose_on_initialize_does_not_return_is_interrupted(files, monkeypatch):
+    """tests/unit/runtime/test_time_limit.py has other kinds of code that does not return."""
+    started = []
+
+    def block(plugin):
+        started.append(plugin)
+        plugin.output("early", float)
+        threading.Event().wait()  # a lock, taken in C
+
+    monkeypatch.setattr(Starting, "act", block)
     # The other plugins are loaded within this time on a busy machine, too.
     world = crowded(files, plugin_timeout=1.0)
-    robot(files, WITNESS, f'name: bad, type: "faults::{which}"', name="bad.yaml")
+    robot(files, WITNESS, bad("Starting"), name="bad.yaml")
     with pytest.raises(PluginError) as caught:
         world.spawn_model("bad.yaml", "second")
     assert str(caught.value).startswith(
-        f'Flatland plugin: Model Plugin "bad" type "faults::{which}" model "second": '
+        'Flatland plugin: Model Plugin "bad" type "test::Starting" model "second": '
         "on_initialize did not return within 1 s ["
     )
     assert world.ports.outputs == {}
-    assert [model.name for model in world.models if "disc" not in model.name] == ["robot"]
+    assert robots(world) == ["robot"]
     run_all_hooks(world)
-    assert all(count > 3 for count in witness(world).values())
-    [plugin] = importlib.import_module(faults).started
     with pytest.raises(PluginError, match='plugin "bad" has ended and cannot open "late"'):
-        plugin.output("late", float)
+        started[0].output("late", float)
     assert world.ports.outputs == {}
 
 
-@pytest.mark.parametrize("timeout", [None, 10])
-def test_on_initialize_runs_in_the_loading_thread(files, faults, timeout):
-    robot(files, 'name: here, type: "faults::ThreadRecorder"')
-    text = "{properties: {}, layers: [], models: [{name: r, model: robot.model.yaml}]}"
-    plugin = files.load(text, plugin_timeout=timeout).model("r").plugin("here")
-    assert plugin.thread is threading.current_thread()
+@pytest.mark.parametrize("timeout", [None, 10, 1e300, float("inf")])
+def test_on_initialize_runs_in_the_loading_thread(files, monkeypatch, timeout):
+    threads = []
+    monkeypatch.setattr(Starting, "act", lambda _: threads.append(threading.current_thread()))
+    alone(files, bad("Starting"), plugin_timeout=timeout)
+    assert threads == [threading.current_thread()]
 
 
-def test_on_initialize_may_not_step_or_close_the_world(files, faults):
-    for act, plugin in (("step", "Stepping"), ("close", "Closing")):
-        robot(files, f'name: bad, type: "faults::{plugin}"', name="bad.yaml")
-        world = crowded(files)
-        with pytest.raises(PluginError, match=f"{act} must not be called from a plugin's hook"):
-            world.spawn_model("bad.yaml", "second")
-        assert not world.closed
-        assert world.time == 0.0
-
-
-def test_a_time_limit_may_be_arbitrarily_long(files, faults):
-    robot(files, 'name: here, type: "faults::ThreadRecorder"')
-    text = "{properties: {}, layers: [], models: [{name: r, model: robot.model.yaml}]}"
-    for timeout in (1e300, float("inf")):
-        assert files.load(text, plugin_timeout=timeout).model("r").plugin("here").thread
+@pytest.mark.parametrize("method", ["step", "close"])
+def test_on_initialize_may_not_step_or_close_the_world(files, monkeypatch, method):
+    world = crowded(files)
+    monkeypatch.setattr(Starting, "act", lambda plugin: getattr(plugin.world, method)())
+    robot(files, bad("Starting"), name="bad.yaml")
+    with pytest.raises(PluginError, match=f"{method} must not be called from a plugin's hook"):
+        world.spawn_model("bad.yaml", "second")
+    assert not world.closed
+    assert world.time == 0.0
 
 
 # -- plugin_errors="raise" -------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("hook", HOOKS)
-def test_step_raises_the_exception_of_a_hook_after_completing_the_step(files, faults, hook):
-    world = crowded(files, f'name: bad, type: "faults::Model", hook: {hook}', plugin_errors="raise")
+def test_step_raises_the_exception_of_a_hook_after_completing_the_step(files, hook):
+    world = crowded(files, bad("Model", hook), plugin_errors="raise")
     if hook == "end_contact":
         world.step()
         world.move_model("robot", (20, 0, 0))
-    time, calls = world.time, dict(witness(world))
+    witness = world.model("robot").plugin("witness")
+    time, calls = world.time, dict(witness.calls)
     with pytest.raises(RuntimeError, match="fault 1") as caught:
         world.step()
-    place = 'Model Plugin "bad" type "faults::Model" model "robot"'
+    place = 'Model Plugin "bad" type "test::Model" model "robot"'
     assert caught.value.__notes__ == [f"raised by {place}: {hook}"]
     assert world.time == pytest.approx(time + 0.005)
     # The hooks of the other plugins ran too, and the plugin is not disabled.
-    assert witness(world)["after_physics_step"] == calls["after_physics_step"] + 1
-    bad = world.model("robot").plugin("bad")
-    before = bad.calls
+    assert witness.calls["after_physics_step"] == calls["after_physics_step"] + 1
+    plugin = world.model("robot").plugin("bad")
+    before = plugin.calls
     if hook != "begin_contact" and hook != "end_contact":
         for _ in range(4):
             with pytest.raises(RuntimeError, match="fault"):
                 world.step()
-        assert bad.calls >= before + 4
+        assert plugin.calls >= before + 4
 
 
-def test_sys_exit_of_a_plugin_is_raised_as_a_plugin_error(files, faults):
+def test_sys_exit_of_a_plugin_is_raised_as_a_plugin_error(files):
     hook = "before_physics_step"
-    world = crowded(
-        files, f'name: bad, type: "faults::Exiting", hook: {hook}', plugin_errors="raise"
-    )
+    world = crowded(files, bad("Exiting", hook), plugin_errors="raise")
     with pytest.raises(PluginError, match=f"{hook} raised SystemExit"):
         world.step()
 
 
-def test_close_raises_the_exception_of_on_shutdown_after_closing(files, faults):
-    world = crowded(files, 'name: bad, type: "faults::FaultyShutdown"', plugin_errors="raise")
-    with pytest.raises(RuntimeError, match="cannot shut down"):
+def test_close_raises_the_exception_of_on_shutdown_after_closing(files):
+    world = crowded(files, bad("Model", "on_shutdown"), plugin_errors="raise")
+    with pytest.raises(RuntimeError, match="fault 1"):
         world.close()
     assert world.closed
     world.close()
 
 
-def test_an_exception_of_a_with_block_is_not_replaced_by_one_of_a_plugin(files, faults):
-    world = crowded(files, 'name: bad, type: "faults::FaultyShutdown"', plugin_errors="raise")
+def test_an_exception_of_a_with_block_is_not_replaced_by_one_of_a_plugin(files):
+    world = crowded(files, bad("Model", "on_shutdown"), plugin_errors="raise")
     with pytest.raises(KeyError), world:
         raise KeyError
     assert world.closed
 
 
-def test_connections_that_cannot_be_closed_are_logged(files, faults, caplog):
+def test_an_error_of_a_file_is_not_replaced_by_one_of_a_plugin(files):
+    robot(files, bad("Model", "on_shutdown"))
+    with pytest.raises(flatland.YamlError, match="unrecognized entry"):
+        files.load(
+            "properties: {}\nlayers: []\nmodels: [{name: r, model: robot.model.yaml}]\nmodel: 1\n"
+        )
+
+
+def test_connections_that_cannot_be_closed_are_logged(files, caplog):
     class Connections:
         def close(self):
             raise OSError("no route")
@@ -492,11 +447,7 @@ def test_connections_that_cannot_be_closed_are_logged(files, faults, caplog):
         def plugin_ros(self, plugin):
             return Connections()
 
-    robot(files, WITNESS)
-    world = files.load(
-        "properties: {}\nlayers: []\nmodels: [{name: r, model: robot.model.yaml}]",
-        observers=[Node()],
-    )
+    world = alone(files, WITNESS, observers=[Node()])
     world.delete_model("r")
     (record,) = caplog.records
     assert "closing its ROS connections failed" in record.getMessage()
@@ -505,49 +456,36 @@ def test_connections_that_cannot_be_closed_are_logged(files, faults, caplog):
     assert world.models == []
 
 
-def test_an_exception_of_a_subscriber_is_raised_by_step_and_not_blamed_on_the_plugin(files, faults):
-    world = laser_world(files, plugin_errors="raise")
+LASER = "type: Laser, name: laser, body: base, range: 5, angle: {min: 0, max: 1, increment: 1}"
+
+
+def fail(scan):
+    raise ValueError("broken subscriber")
+
+
+def test_an_exception_of_a_subscriber_is_raised_by_step_and_not_blamed_on_the_plugin(files):
+    world = alone(files, LASER, plugin_errors="raise")
     output = world.output("/scan")
-
-    def fail(scan):
-        raise ValueError("broken subscriber")
-
     unsubscribe = output.subscribe(fail)
     for _ in range(5):
         with pytest.raises(ValueError, match="broken subscriber") as caught:
             world.step()
-    [note] = caught.value.__notes__
-    assert note.startswith("raised by subscriber ")
-    assert note.endswith('fail of output "/scan"')
+    assert caught.value.__notes__ == ['raised by subscriber fail of output "/scan"']
     unsubscribe()
     stamp = output.latest.stamp
     world.step()
     assert output.latest.stamp > stamp
 
 
-def test_an_exception_of_a_subscriber_is_logged_and_never_disables_the_plugin(
-    files, faults, caplog
-):
-    world = laser_world(files, plugin_errors="disable")
+def test_an_exception_of_a_subscriber_is_logged_and_never_disables_the_plugin(files, caplog):
+    world = alone(files, LASER, plugin_errors="disable")
     output = world.output("/scan")
-
-    def fail(scan):
-        raise ValueError("broken subscriber")
-
     output.subscribe(fail)
     world.step(10)
     assert output.latest.stamp == 9 * world.timekeeper.step_size_ns
     assert caplog.text.count("ValueError: broken subscriber") == 1
-    assert 'fail of output "/scan" raised' in caplog.text
+    assert 'subscriber fail of output "/scan" raised' in caplog.text
     assert "disabled" not in caplog.text
-
-
-def laser_world(files, **options):
-    """Loads a world with one robot whose laser scans in each step."""
-    laser = "type: Laser, name: laser, body: base, range: 5, angle: {min: 0, max: 1, increment: 1}"
-    robot(files, laser)
-    text = "{properties: {}, layers: [{name: 2d}], models: [{name: r, model: robot.model.yaml}]}"
-    return files.load(text, **options)
 
 
 # -- within the physics step -----------------------------------------------------------------
@@ -555,7 +493,7 @@ def laser_world(files, **options):
 
 def acting(files):
     """A world whose robot calls a function in `pre_solve`."""
-    world = crowded(files, 'name: acting, type: "faults::Acting"')
+    world = crowded(files, 'name: acting, type: "test::Acting"')
     return world, world.model("robot").plugin("acting")
 
 
@@ -566,38 +504,31 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_pre_solve_may_not_change_the_world(files, faults, caplog, what):
+def test_pre_solve_may_not_change_the_world(files, caplog, what):
     world, plugin = acting(files)
     plugin.act = REFUSED[what]
     world.step()
     assert plugin.errors
     assert all(isinstance(error, WorldLockedError) for error in plugin.errors)
-    assert 'Model Plugin "acting" type "faults::Acting" model "robot": pre_solve raised' in (
-        caplog.text
-    )
+    assert '"acting" type "test::Acting" model "robot": pre_solve raised' in caplog.text
     # Box2D is intact: this step was completed, and so are the next ones.
     assert len(world.models) == 5
     assert len(world.contacts) == 4
     run_all_hooks(world)
-    assert all(count > 3 for count in witness(world).values())
 
 
-def test_an_exception_in_pre_solve_does_not_change_the_contact(files, faults):
+def test_an_exception_in_pre_solve_does_not_change_the_contact(files):
     """The discs push each other apart as they do without the plugin."""
     quiet, _ = acting(files)
     quiet.step(20)
     loud, plugin = acting(files)
-
-    def act(plugin, contact):
-        raise RuntimeError("no")
-
-    plugin.act = act
+    plugin.act = lambda plugin, contact: 1 / 0
     loud.step(20)
     assert len(plugin.errors) == 3
     assert [model.pose for model in loud.models] == [model.pose for model in quiet.models]
 
 
-def test_contacts_of_bodies_without_a_model_are_ignored(files, faults):
+def test_contacts_of_bodies_without_a_model_are_ignored(files):
     """A plugin may create bodies in the physics world; hooks are not called for them."""
     world, plugin = acting(files)
     stranger = world.physics.create_body("dynamic", (0.2, 0.2, 0))
@@ -610,7 +541,7 @@ def test_contacts_of_bodies_without_a_model_are_ignored(files, faults):
     assert len(world.contacts) == 4
 
 
-def test_an_interrupt_in_pre_solve_is_raised_by_the_step(files, faults):
+def test_an_interrupt_in_pre_solve_is_raised_by_the_step(files):
     """Control-C often interrupts the hook, as the rest of a step runs no Python code."""
     world, plugin = acting(files)
 
@@ -622,11 +553,3 @@ def test_an_interrupt_in_pre_solve_is_raised_by_the_step(files, faults):
         world.step()
     plugin.act = None
     world.step()
-
-
-def test_an_error_of_a_file_is_not_replaced_by_one_of_a_plugin(files, faults):
-    robot(files, 'name: bad, type: "faults::FaultyShutdown"')
-    with pytest.raises(flatland.YamlError, match="unrecognized entry"):
-        files.load(
-            "properties: {}\nlayers: []\nmodels: [{name: r, model: robot.model.yaml}]\nmodel: 1\n"
-        )

@@ -134,7 +134,7 @@ def test_while_a_simulation_runs_all_requests_run_in_its_thread(
         assert running.wait(TIMEOUT)
 
         def spawn(number: int) -> None:
-            for turn in range(20):
+            for turn in range(5):
                 pose = (10.0 * turn, 10.0 * number, 0.0)
                 world.spawn_model("minimal.model.yaml", f"{number}-{turn}", pose=pose)
 
@@ -143,7 +143,7 @@ def test_while_a_simulation_runs_all_requests_run_in_its_thread(
         simulation.stop()
         server = loop.result(TIMEOUT)
     assert set(threads) == {server}
-    assert len(threads) == 80
+    assert len(threads) == 20
 
 
 def test_a_request_that_is_queued_when_the_simulation_ends_runs(files: Any) -> None:

@@ -66,12 +66,6 @@ def test_the_loop_catches_up_exactly(simulate: Any, load: Load) -> None:
     assert load.starts == expected
 
 
-def test_work_concentrated_in_one_step_does_not_change_the_rate(simulate: Any, load: Load) -> None:
-    # Like a hundred lasers at a tenth of the rate; the load is 90 %.
-    load.cost = lambda step: 7.125 if step % 10 == 0 else 0.1875
-    assert run(simulate(), 1000) == 1000
-
-
 def test_burst_is_not_longer_than_max_lag(simulate: Any, load: Load) -> None:
     load.cost = lambda step: 1000.0 if step == 10 else 0.0
     total = run(simulate(), 100)
@@ -79,14 +73,6 @@ def test_burst_is_not_longer_than_max_lag(simulate: Any, load: Load) -> None:
     assert load.starts[11:28] == [1010] * 17
     assert load.starts[28:] == [1010 + step for step in range(1, 73)]
     assert total == 100 + 999 - 16
-
-
-def test_an_overload_is_followed_by_a_burst_of_max_lag_at_most(simulate: Any, load: Load) -> None:
-    load.cost = lambda step: 2.0 if step < 200 else 0.0
-    run(simulate(), 300)
-    assert load.starts[:201] == [2 * step for step in range(201)]
-    assert load.starts.count(400) == 17
-    assert load.starts[-1] == 400 + 300 - 217
 
 
 @pytest.mark.parametrize("lost", [1, 12, 1000])

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from raw_web_client import RawWebClient
 from waiting import TIMEOUT
 
 from flatland.simulation import Simulation
@@ -68,3 +69,11 @@ def url(world: World, simulation: Simulation, viewer: WebViewer) -> str:
     """Address of a viewer that shows the world."""
     viewer.add_world(world, "room", simulation)
     return viewer.url
+
+
+@pytest.fixture
+def client(url: str) -> Iterator[RawWebClient]:
+    """A client that has received the models."""
+    with RawWebClient(url) as client:
+        client.wait_model("robot")
+        yield client

@@ -47,9 +47,7 @@ def is_served(connection: socket.socket) -> bool:
         return False
 
 
-def test_a_connection_without_a_complete_header_is_closed(
-    connect: Callable[[], socket.socket], url: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_connection_without_a_complete_header_is_closed(connect, url, monkeypatch):
     with RawWebClient(url) as client:
         served = connect()
         assert is_served(served)
@@ -63,11 +61,7 @@ def test_a_connection_without_a_complete_header_is_closed(
         client.ask("files")
 
 
-def test_connections_of_an_address_are_limited(
-    connect: Callable[[], socket.socket],
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_connections_of_an_address_are_limited(connect, monkeypatch, caplog):
     monkeypatch.setattr(acceptor, "MAX_OF_ADDRESS", 3)
     accepted = [connect() for _ in range(3)]
     assert all(map(is_served, accepted))
@@ -78,9 +72,7 @@ def test_connections_of_an_address_are_limited(
         pass  # The server has not received the end of the connection.
 
 
-def test_a_new_connection_replaces_the_oldest_one_without_a_request(
-    connect: Callable[[], socket.socket], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_new_connection_replaces_the_oldest_one_without_a_request(connect, monkeypatch):
     monkeypatch.setattr(acceptor, "MAX_CONNECTIONS", 4)
     oldest = connect()
     # The server accepts connections in order once a request is answered in between.
@@ -94,11 +86,7 @@ def test_a_new_connection_replaces_the_oldest_one_without_a_request(
     assert is_closed(connect())
 
 
-def test_the_server_waits_for_file_descriptors(
-    connect: Callable[[], socket.socket],
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_the_server_waits_for_file_descriptors(connect, monkeypatch, caplog):
     silent = connect()
     assert is_served(connect())  # The server has accepted both.
     accept = socket.socket.accept

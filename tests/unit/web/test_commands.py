@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -13,14 +12,6 @@ from waiting import wait_until
 from flatland.runtime import file_reads
 from flatland.simulation import Simulation
 from flatland.web import WebViewer, commands
-
-
-@pytest.fixture
-def client(url: str) -> Iterator[RawWebClient]:
-    """A client that has received the models."""
-    with RawWebClient(url) as client:
-        client.wait_model("robot")
-        yield client
 
 
 @pytest.fixture
@@ -84,10 +75,11 @@ class TestTime:
 
 class TestModels:
     def test_spawn(self, client, world, files):
-        result = client.ask("spawn", file="box.model.yaml", name="box", pose=[6, 6, 1])
-        assert result == {"name": "box"}
+        place = {"pose": [6, 6, 1], "namespace": "b"}
+        assert client.ask("spawn", file="box.model.yaml", name="box", **place) == {"name": "box"}
         np.testing.assert_allclose(world.model("box").pose, [6, 6, 1], atol=1e-6)
-        assert client.wait_model("box")["file"] == str(files.folder / "box.model.yaml")
+        box = client.wait_model("box")
+        assert (box["namespace"], box["file"]) == ("b", str(files.folder / "box.model.yaml"))
 
     @pytest.mark.parametrize(
         ("fields", "error"),

@@ -41,9 +41,7 @@ def world(path: Path) -> Iterator[World]:
         yield world
 
 
-def test_the_page_shows_what_the_program_does(
-    world: World, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_page_shows_what_the_program_does(world, capsys):
     view = world.view()
     assert capsys.readouterr().err == f"flatland: {view.url}\n"
     assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=\S{16,}", view.url)
@@ -67,7 +65,7 @@ def test_the_page_shows_what_the_program_does(
     view.close()
 
 
-def test_the_page_follows_a_program_in_a_loop(world: World) -> None:
+def test_the_page_follows_a_program_in_a_loop(world):
     done = threading.Event()
 
     def program() -> None:
@@ -86,9 +84,7 @@ def test_the_page_follows_a_program_in_a_loop(world: World) -> None:
     assert world.models == []
 
 
-def test_a_notebook_shows_the_page_in_a_frame(
-    world: World, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_notebook_shows_the_page_in_a_frame(world, monkeypatch, capsys):
     # What IPython is in the kernel of a notebook.
     shell = types.SimpleNamespace(kernel=object())
     ipython = types.SimpleNamespace(get_ipython=lambda: shell)
@@ -103,7 +99,7 @@ def test_a_notebook_shows_the_page_in_a_frame(
     assert world.view().url in capsys.readouterr().err, "IPython is imported, but not used"
 
 
-def test_a_further_call_replaces_the_view(world: World) -> None:
+def test_a_further_call_replaces_the_view(world):
     first = world.view()
     second = world.view(token="a known token of a view", read_only=True)
     assert first.closed
@@ -121,7 +117,7 @@ def test_a_further_call_replaces_the_view(world: World) -> None:
         assert third.world is clone
 
 
-def test_the_view_ends_with_the_world(path: Path) -> None:
+def test_the_view_ends_with_the_world(path):
     world = World.from_yaml(path, seed=1)
     view = world.view()
     with WebClient(view.url) as client:
@@ -136,7 +132,7 @@ def test_the_view_ends_with_the_world(path: Path) -> None:
         world.view()
 
 
-def test_snapshots_do_not_contain_the_view(world: World) -> None:
+def test_snapshots_do_not_contain_the_view(world):
     snapshot = world.snapshot()
     with world.view() as view, WebClient(view.url) as client:
         world.step(10)
@@ -149,12 +145,12 @@ def test_snapshots_do_not_contain_the_view(world: World) -> None:
 
 
 @pytest.mark.parametrize("arguments", [{"height": 0}, {"port": -1}, {"port": 65536}])
-def test_an_invalid_argument_is_an_error(world: World, arguments: dict[str, int]) -> None:
+def test_an_invalid_argument_is_an_error(world, arguments):
     with pytest.raises(ValueError, match=next(iter(arguments))):
         world.view(**arguments)
 
 
-def test_a_program_ends_although_the_view_is_open(path: Path) -> None:
+def test_a_program_ends_although_the_view_is_open(path):
     code = "import sys, flatland; flatland.World.from_yaml(sys.argv[1]).view(); print('end')"
     done = run_program([sys.executable, "-c", code, path], check=True)
     assert done.stdout == "end\n"

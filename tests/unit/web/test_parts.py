@@ -73,14 +73,9 @@ class TestMessages:
             ('{"type": "pause", "more": 1}', "pause: unknown field 'more'"),
             ('{"type": "move", "model": 1}', "move: pose is missing"),
             ('{"type": "move", "model": 1, "pose": [1, 2]}', "move: pose must be [x, y, theta]"),
-            ('{"type": "move", "model": 1, "pose": [1, 2, 1e999]}', "move: pose must be"),
-            (
-                '{"type": "move", "model": true, "pose": [1, 2, 3]}',
-                "move: model must be an integer",
-            ),
+            ('{"type": "move", "model": true, "pose": [1, 2, 3]}', "move: model must be an int"),
             ('{"type": "set_rate", "rate": -1}', "set_rate: rate must be a number from 0"),
             ('{"type": "step", "n": 0}', "step: n must be an integer from 1"),
-            ('{"type": "look", "worlds": 0}', "look: worlds must be a list"),
             ('{"type": "look", "scans": 1}', "look: scans must be true or false"),
             ('{"type": "preview", "file": "a\\u0000b"}', "preview: file must be a text without"),
             ('{"type": "preview", "file": "\\ud800"}', "preview: file must be a text without"),
@@ -111,11 +106,8 @@ class TestMessages:
     def test_all_types_are_described(self, checkout):
         page = (checkout / "docs" / "web_protocol.md").read_text()
         for kind, (required, optional) in messages._FIELDS.items():
-            (row,) = [
-                line
-                for line in page.splitlines()
-                if line.startswith("|") and f"`{kind}`" in line.split("|")[1]
-            ]
+            rows = [line for line in page.splitlines() if line.startswith("|")]
+            (row,) = [line for line in rows if f"`{kind}`" in line.split("|")[1]]
             assert all(f"`{name}`" in row for name in (*required, *optional)), kind
 
 
@@ -154,18 +146,10 @@ class TestNumbers:
         output = Output("/a/b", Reading)
         assert series_of(output) == ["/a/b/level", "/a/b/on", "/a/b/pair/0", "/a/b/pair/1"]
         output.emit(self.READING)
-        assert series_of(output) == [
-            "/a/b/level",
-            "/a/b/on",
-            "/a/b/parts/a",
-            "/a/b/pair/0",
-            "/a/b/pair/1",
-        ]
-        assert series_of(Output("fix", NavSatFix)) == [
-            "/fix/latitude",
-            "/fix/longitude",
-            "/fix/altitude",
-        ]
+        names = ["level", "on", "parts/a", "pair/0", "pair/1"]
+        assert series_of(output) == [f"/a/b/{name}" for name in names]
+        names = ["latitude", "longitude", "altitude"]
+        assert series_of(Output("fix", NavSatFix)) == [f"/fix/{name}" for name in names]
         assert "/odom/pose/2" in series_of(Output("odom", Odometry))
         assert series_of(Output("on", bool)) == ["/on"]
 
@@ -189,13 +173,10 @@ class TestNumbers:
 
 
 class TestAccess:
-    @pytest.mark.parametrize("host", ["localhost", "LOCALHOST", "127.0.0.1", "127.8.9.1", "::1"])
-    def test_loopback(self, host):
-        assert is_loopback(host)
-
-    @pytest.mark.parametrize("host", ["0.0.0.0", "10.0.0.1", "", "localhost.example.org", "::"])
-    def test_other_hosts(self, host):
-        assert not is_loopback(host)
+    def test_loopback(self):
+        own = ["localhost", "LOCALHOST", "127.0.0.1", "127.8.9.1", "::1"]
+        others = ["0.0.0.0", "10.0.0.1", "", "localhost.example.org", "::"]
+        assert [host for host in own + others if is_loopback(host)] == own
 
     @pytest.mark.parametrize(
         ("origin", "host", "allowed"),

@@ -32,16 +32,8 @@ def test_the_error_is_at_most_a_resolution_and_a_hit_remains_a_hit():
 
 
 def test_special_values_have_codes():
-    ranges = [
-        np.nan,
-        np.inf,
-        20.1,
-        30.0,
-        -np.inf,
-        0.0,
-        -1.0,
-        np.nextafter(np.float32(20.1), np.float32(0)),
-    ]
+    below = np.nextafter(np.float32(20.1), np.float32(0))
+    ranges = [np.nan, np.inf, 20.1, 30.0, -np.inf, 0.0, -1.0, below]
     expected = [65535, 65535, 65535, 65535, 65534, 0, 0, 65533]
     assert codes(ranges, 20.1)[0] == expected
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,16 +14,22 @@ from ranging_plugins import Cone, Fan
 from raw_web_client import RawWebClient
 from waiting import wait_until
 
-from flatland.simulation import Simulation
 from flatland.values import Twist
-from flatland.web import WebViewer
 from flatland.web.capture import WorldCapture
 
-WORLD = """
-properties: {}
-layers: [{name: walls, map: room.yaml}]
-models: [{name: robot, model: robot.model.yaml, pose: [3, 5, 0]}]
-"""
+
+@pytest.fixture
+def captured(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The times of all captures of worlds [s]."""
+    times: list[float] = []
+    take = WorldCapture.take
+
+    def record(self: WorldCapture, demand: Any) -> Any:
+        times.append(time.monotonic())
+        return take(self, demand)
+
+    monkeypatch.setattr(WorldCapture, "take", record)
+    return times
 
 
 def wanted(world: Any) -> set[str]:
@@ -54,13 +61,8 @@ class TestStart:
             assert (robot["name"], robot["namespace"]) == ("robot", "")
             assert [body["name"] for body in robot["bodies"]] == ["base", "arm"]
             circle, polygon = robot["bodies"][0]["shapes"]
-            assert circle == {
-                "kind": "circle",
-                "center": [0, 0],
-                "radius": 0.5,
-                "layers": ["walls"],
-                "sensor": False,
-            }
+            shape = {"kind": "circle", "center": [0, 0], "radius": 0.5}
+            assert circle == {**shape, "layers": ["walls"], "sensor": False}
             assert polygon["kind"] == "polygon"
             assert len(polygon["points"]) == 3
             assert polygon["sensor"]
@@ -105,85 +107,47 @@ class TestStart:
 
 
 class TestPoses:
-    def test_poses_follow_the_bodies(self, url, world):
-        with RawWebClient(url) as client:
-            robot = client.wait_model("robot")
-            base, arm = (body["id"] for body in robot["bodies"])
-            first = client.wait(2).poses()
-            assert set(first) == {base, arm}
-            np.testing.assert_allclose(first[base], [3, 5, 0], atol=1e-3)
-            world.command("/cmd_vel").set(Twist(1.0))
-            moved = client.wait(2, lambda message: message.poses().get(base, first[base])[0] > 3.3)
-            assert moved.time > 0
-            np.testing.assert_allclose(
-                moved.poses()[arm][0] - moved.poses()[base][0], 0.1, atol=0.01
-            )
+    def test_poses_follow_the_bodies(self, client, world):
+        robot = client.model("robot")
+        base, arm = (body["id"] for body in robot["bodies"])
+        first = client.wait(2).poses()
+        assert set(first) == {base, arm}
+        np.testing.assert_allclose(first[base], [3, 5, 0], atol=1e-3)
+        world.command("/cmd_vel").set(Twist(1.0))
+        moved = client.wait(2, lambda message: message.poses().get(base, first[base])[0] > 3.3)
+        assert moved.time > 0
+        np.testing.assert_allclose(moved.poses()[arm][0] - moved.poses()[base][0], 0.1, atol=0.01)
 
-    def test_only_bodies_that_moved_are_sent(self, url, world):
-        with RawWebClient(url) as client:
-            world.pause()
-            world.spawn_model("box.model.yaml", "box", pose=(6, 6, 0))
-            box = client.wait_model("box")["bodies"][0]["id"]
-            client.wait(2, lambda message: box in message.poses())
-            client.wait("status", lambda message: message["paused"])
-            client.receive_until("status")
-            assert [m for m in client.receive_until("status") if not isinstance(m, dict)] == []
-            world.move_model("box", (6, 7, 0.5))
-            poses = client.wait(2).poses()
-            assert set(poses) == {box}
-            np.testing.assert_allclose(poses[box], [6, 7, 0.5], atol=1e-6)
-
-    def test_ids_are_sent_if_other_bodies_moved_than_before(self, url, world):
-        def has_ids(message: Any) -> bool:
-            return message.bodies is None
-
-        with RawWebClient(url) as client:
-            robot, other = client.wait_model("robot"), "box.model.yaml"
-            assert has_ids(client.wait(2))
-            world.command("/cmd_vel").set(Twist(0.0, 0.0, 2.0))
-            bodies = {body["id"] for body in robot["bodies"]}
-            assert set(client.wait(2, lambda m: not has_ids(m)).poses()) == bodies
-            world.spawn_model(other, "box", pose=(6, 6, 0))
-            box = client.wait_model("box")["bodies"][0]["id"]
-            assert set(client.wait(2, has_ids).poses()) == {*bodies, box}
-            assert set(client.wait(2, has_ids).poses()) == bodies
-            assert set(client.wait(2, lambda m: not has_ids(m)).poses()) == bodies
-
-    def test_a_second_client_gets_all_poses(self, url, world):
+    def test_only_bodies_that_moved_are_sent(self, client, world):
         world.pause()
-        with RawWebClient(url) as client:
-            first = client.wait(2).poses()
-            with RawWebClient(url) as other:
-                assert set(other.wait(2).poses()) == set(first)
+        world.spawn_model("box.model.yaml", "box", pose=(6, 6, 0))
+        box = client.wait_model("box")["bodies"][0]["id"]
+        client.wait(2, lambda message: box in message.poses())
+        client.wait("status", lambda message: message["paused"])
+        client.receive_until("status")
+        assert [m for m in client.receive_until("status") if not isinstance(m, dict)] == []
+        world.move_model("box", (6, 7, 0.5))
+        poses = client.wait(2).poses()
+        assert set(poses) == {box}
+        np.testing.assert_allclose(poses[box], [6, 7, 0.5], atol=1e-6)
 
-    def test_at_most_thirty_messages_per_second(self, url, world, monkeypatch):
-        times = []
-        take = WorldCapture.take
-
-        def record(self: WorldCapture, demand: Any) -> Any:
-            times.append(time.monotonic())
-            return take(self, demand)
-
-        monkeypatch.setattr(WorldCapture, "take", record)
-        with RawWebClient(url):
-            wait_until("twenty captures", lambda: len(times) > 20)
+    def test_at_most_thirty_messages_per_second(self, captured, client):
+        wait_until("twenty captures", lambda: len(captured) > 20)
         # The server waits at least this long, on any machine; the first capture may be late.
-        assert times[20] - times[0] > 0.5 * 20 / 30
+        assert captured[20] - captured[0] > 0.5 * 20 / 30
 
 
 class TestScans:
-    def test_scans_arrive_if_they_are_wanted(self, url, world):
-        with RawWebClient(url) as client:
-            client.wait("models")
-            assert wanted(world) == set()
-            client.ask("look", scans=True)
-            laser = client.model("robot")["lasers"][0]["id"]
-            pose, ranges = client.wait(3).scans()[laser]
-            np.testing.assert_allclose(pose, [3.2, 5, 0], atol=1e-4)
-            expected = [world.models[0].plugin("eye").cast_without_noise()[1]]
-            np.testing.assert_array_equal(ranges, expected[0])
-            client.ask("look", scans=False)
-            wait_until("the scans are not computed", lambda: wanted(world) == set())
+    def test_scans_arrive_if_they_are_wanted(self, client, world):
+        assert wanted(world) == set()
+        client.ask("look", scans=True)
+        laser = client.model("robot")["lasers"][0]["id"]
+        pose, ranges = client.wait(3).scans()[laser]
+        np.testing.assert_allclose(pose, [3.2, 5, 0], atol=1e-4)
+        expected = [world.models[0].plugin("eye").cast_without_noise()[1]]
+        np.testing.assert_array_equal(ranges, expected[0])
+        client.ask("look", scans=False)
+        wait_until("the scans are not computed", lambda: wanted(world) == set())
 
     def test_compact_scans_arrive_beside_exact_ones(self, url, world):
         with RawWebClient(url) as client, RawWebClient(url) as exact:
@@ -203,147 +167,112 @@ class TestScans:
             client.ask("look", compact_scans=False)
             assert laser["id"] in client.wait(3).scans()
 
-    def test_a_scan_is_sent_once(self, url, world):
-        with RawWebClient(url) as client:
-            client.ask("look", scans=True)
-            client.wait(3)
-            world.pause()
-            client.wait("status", lambda message: message["paused"])
-            # The captures before the pause have been sent with the next status at the latest.
-            client.receive_until("status")
-            assert not [m for m in client.receive_until("status") if getattr(m, "kind", 0) == 3]
-
-    def test_a_second_client_gets_the_last_scan_of_a_paused_world(self, url, world):
-        with RawWebClient(url) as client, RawWebClient(url) as other:
-            client.ask("look", scans=True)
-            client.wait(3)
-            world.pause()
+    def test_a_second_client_gets_the_poses_and_scans_of_a_paused_world(self, client, url, world):
+        client.ask("look", scans=True)
+        client.wait(3)
+        world.pause()
+        client.wait("status", lambda message: message["paused"])
+        with RawWebClient(url) as other:
+            robot = other.wait_model("robot")
+            assert set(other.wait(2).poses()) == {body["id"] for body in robot["bodies"]}
             other.ask("look", scans=True)
             assert other.wait(3).scans()
+        # The captures before the pause have been sent with the next status at the latest.
+        client.receive_until("status")
+        assert not [m for m in client.receive_until("status") if getattr(m, "kind", 0) == 3]
 
 
 class TestChanges:
-    def test_models_are_added_and_removed(self, url, world):
-        with RawWebClient(url) as client:
-            robot = client.wait_model("robot")
-            world.spawn_model("box.model.yaml", "box", namespace="b", pose=(6, 6, 0))
-            box = client.wait_model("box")
-            assert box["namespace"] == "b"
-            message = client.received[-1]
-            assert not message["complete"]
-            assert [model["name"] for model in message["models"]] == ["box"]
+    def test_a_model_that_replaces_another_one_has_a_new_id(self, client, world):
+        robot = client.model("robot")
+
+        def replace() -> None:
             world.delete_model("robot")
-            message = client.wait("models")
-            assert (message["models"], message["removed"]) == ([], [robot["id"]])
+            world.spawn_model("robot.model.yaml", "robot", pose=(5, 5, 0))
 
-    def test_a_model_that_replaces_another_one_has_a_new_id(self, url, world):
-        with RawWebClient(url) as client:
-            robot = client.wait_model("robot")
+        world.between_steps(replace)
+        message = client.wait("models")
+        assert message["removed"] == [robot["id"]]
+        ids = {model["id"] for model in message["models"]}
+        assert ids.isdisjoint({robot["id"]})
+        assert len(ids) == 1
 
-            def replace() -> None:
-                world.delete_model("robot")
-                world.spawn_model("robot.model.yaml", "robot", pose=(5, 5, 0))
+    def test_a_changed_colour_is_sent(self, client, world):
+        robot = client.model("robot")
+        world.models[0].bodies[0].color = (1.0, 1.0, 0.0, 1.0)
+        message = client.wait("models")
+        assert message["models"][0]["bodies"][0]["color"] == [1, 1, 0, 1]
+        assert message["models"][0]["id"] == robot["id"]
 
-            world.between_steps(replace)
-            message = client.wait("models")
-            assert message["removed"] == [robot["id"]]
-            ids = {model["id"] for model in message["models"]}
-            assert ids.isdisjoint({robot["id"]})
-            assert len(ids) == 1
+    def test_a_changed_appearance_is_sent(self, client, world):
+        robot = client.model("robot")
+        [shape, *_] = robot["bodies"][0]["shapes"]
+        assert shape["layers"] == ["walls"]
+        world.between_steps(lambda: world.set_appearance("robot", visible=False))
+        [hidden] = client.wait("models")["models"]
+        assert (hidden["id"], hidden["bodies"][0]["shapes"]) == (robot["id"], [])
+        world.between_steps(lambda: world.set_appearance("robot", visible=True))
+        assert client.wait("models")["models"] == [robot]
+        # New layers alone are found, too.
+        world.between_steps(lambda: world.set_appearance("robot", layers="all"))
+        assert client.wait("models")["models"] == [robot]
 
-    def test_a_changed_colour_is_sent(self, url, world):
-        with RawWebClient(url) as client:
-            robot = client.wait_model("robot")
-            world.models[0].bodies[0].color = (1.0, 1.0, 0.0, 1.0)
-            message = client.wait("models")
-            assert message["models"][0]["bodies"][0]["color"] == [1, 1, 0, 1]
-            assert message["models"][0]["id"] == robot["id"]
+    def test_new_edges_of_a_layer_are_sent(self, client, world):
+        edges = np.array([[1, 1, 2, 2]], np.float32)
 
-    def test_a_changed_appearance_is_sent(self, url, world):
-        with RawWebClient(url) as client:
-            robot = client.wait_model("robot")
-            [shape, *_] = robot["bodies"][0]["shapes"]
-            assert shape["layers"] == ["walls"]
-            world.between_steps(lambda: world.set_appearance("robot", visible=False))
-            [hidden] = client.wait("models")["models"]
-            assert (hidden["id"], hidden["bodies"][0]["shapes"]) == (robot["id"], [])
-            world.between_steps(lambda: world.set_appearance("robot", visible=True))
-            assert client.wait("models")["models"] == [robot]
-            # New layers alone are found, too.
-            world.between_steps(lambda: world.set_appearance("robot", layers="all"))
-            assert client.wait("models")["models"] == [robot]
+        def add() -> None:
+            world.layers[0].add_edges(edges)
+            world.layer_changed(world.layers[0])
 
-    def test_new_edges_of_a_layer_are_sent(self, url, world):
-        with RawWebClient(url) as client:
-            client.wait("models")
-            edges = np.array([[1, 1, 2, 2]], np.float32)
+        world.between_steps(add)
+        assert client.wait("world")["layers"][0]["edges"] == 9
+        np.testing.assert_array_equal(client.wait(1).edges()[1][-1], [1, 1, 2, 2])
 
-            def add() -> None:
-                world.layers[0].add_edges(edges)
-                world.layer_changed(world.layers[0])
-
-            world.between_steps(add)
-            assert client.wait("world")["layers"][0]["edges"] == 9
-            np.testing.assert_array_equal(client.wait(1).edges()[1][-1], [1, 1, 2, 2])
-
-    def test_a_reset_is_followed(self, url, world):
-        with RawWebClient(url) as client:
-            robot = client.wait_model("robot")
-            base = robot["bodies"][0]["id"]
-            world.move_model("robot", (7, 7, 0))
-            client.wait(2, lambda m: base in m.poses() and m.poses()[base][0] > 6.9)
-            world.between_steps(world.reset)
-            client.wait(2, lambda m: any(abs(pose[0] - 3) < 0.01 for pose in m.poses().values()))
+    def test_a_reset_is_followed(self, client, world):
+        robot = client.model("robot")
+        base = robot["bodies"][0]["id"]
+        world.move_model("robot", (7, 7, 0))
+        client.wait(2, lambda m: base in m.poses() and m.poses()[base][0] > 6.9)
+        world.between_steps(world.reset)
+        client.wait(2, lambda m: any(abs(pose[0] - 3) < 0.01 for pose in m.poses().values()))
 
 
 class TestStatus:
-    def test_the_real_time_factor_and_the_rate(self, url, simulation):
-        with RawWebClient(url) as client:
-            status = client.wait("status", lambda m: m["real_time_factor"] > 0.5)
-            assert status["rate"] == 200
-            assert not status["paused"]
-            simulation.post(lambda: simulation.set_rate(math.inf)).result(30)
-            client.wait("status", lambda m: m["rate"] == 0)
+    def test_the_real_time_factor_and_the_rate(self, client, simulation):
+        status = client.wait("status", lambda m: m["real_time_factor"] > 0.5)
+        assert status["rate"] == 200
+        assert not status["paused"]
+        simulation.post(lambda: simulation.set_rate(math.inf)).result(30)
+        client.wait("status", lambda m: m["rate"] == 0)
 
-    def test_a_simulator_that_does_not_answer_is_reported(self, url, world):
+    def test_a_simulator_that_does_not_answer_is_reported(self, client, world):
         release = threading.Event()
-        with RawWebClient(url) as client:
-            client.wait("models")
-            blocked = world.post(lambda: release.wait(60))
-            client.wait("status", lambda message: message["stale"] > 0.5)
-            release.set()
-            blocked.result(60)
-            client.wait("status", lambda message: message["stale"] == 0)
+        blocked = world.post(lambda: release.wait(60))
+        client.wait("status", lambda message: message["stale"] > 0.5)
+        release.set()
+        blocked.result(60)
+        client.wait("status", lambda message: message["stale"] == 0)
 
 
 class TestNobodyLooks:
-    def test_nothing_is_computed(self, url, world, viewer, monkeypatch):
-        taken = []
-        take = WorldCapture.take
-        monkeypatch.setattr(
-            WorldCapture,
-            "take",
-            lambda self, demand: (taken.append(1), take(self, demand))[1],
-        )
+    def test_nothing_is_computed(self, url, world, captured):
+        def assert_nothing_is_captured() -> None:
+            wait_until("the scans are not computed", lambda: wanted(world) == set())
+            captured.clear()
+            before = world.time
+            wait_until("the world goes on", lambda: world.time > before + 0.2)
+            assert not captured
+
         assert not world._observers.watch_steps
         with RawWebClient(url) as client:
             client.ask("look", scans=True)
             client.wait(3)
-            assert taken
+            assert captured
             client.ask("look", hidden=True)
-            wait_until("the scans are not computed", lambda: wanted(world) == set())
-            taken.clear()
-            time_before = world.time
-            wait_until("the world goes on", lambda: world.time > time_before + 0.2)
-            client.ask("describe_series")
-            assert not taken
+            assert_nothing_is_captured()
             client.ask("look", hidden=False)
             client.wait(3)
-        wait_until("the scans are not computed", lambda: wanted(world) == set())
-        taken.clear()
-        time_before = world.time
-        wait_until("the world goes on", lambda: world.time > time_before + 0.2)
-        assert not taken
+        assert_nothing_is_captured()
         assert not world._observers.watch_steps
 
 
@@ -410,43 +339,39 @@ def test_captures_do_not_change_the_simulation(files, world, viewer):
         assert world.state_hash() == other.state_hash()
 
 
-def test_a_step_is_not_held_up_by_the_viewer(url, simulation: Simulation, world, viewer: WebViewer):
+def test_a_step_is_not_held_up_by_the_viewer(client, simulation, world, viewer):
     """While the thread of the server is blocked, the simulation goes on."""
-    with RawWebClient(url) as client:
-        client.wait("models")
-        release = threading.Event()
-        viewer._call(lambda: release.wait(60))
-        try:
-            start = world.time
-            wait_until("the world goes on", lambda: world.time > start + 0.5)
-        finally:
-            release.set()
-        client.wait("status", lambda message: message["time"] > start + 0.4)
+    release = threading.Event()
+    viewer._call(lambda: release.wait(60))
+    try:
+        start = world.time
+        wait_until("the world goes on", lambda: world.time > start + 0.5)
+    finally:
+        release.set()
+    client.wait("status", lambda message: message["time"] > start + 0.4)
 
 
 class TestOtherSensors:
-    def test_an_upside_down_laser_turns_the_other_way(self, files, viewer):
-        files.write_map("room", ["##########", *["#........#"] * 8, "##########"])
+    def test_an_upside_down_laser_turns_the_other_way(self, files, world, viewer):
         files.write(
             "robot.model.yaml",
             "bodies: [{name: b, footprints: []}]\n"
             "plugins: [{type: Laser, name: l, body: b, range: 20, upside_down: true,\n"
             "  angle: {min: 0, max: 1, increment: 0.5}}]",
         )
-        viewer.add_world(files.load(WORLD))
+        viewer.add_world(files.load(Path(world.path).read_text()))
         with RawWebClient(viewer.url) as client:
             (laser,) = client.wait_model("robot")["lasers"]
             assert (laser["angle_min"], laser["angle_increment"]) == (0, -0.5)
 
-    def test_plugins_with_similar_values_are_shown(self, files, viewer, declare_plugins):
+    def test_plugins_with_similar_values_are_shown(self, files, world, viewer, declare_plugins):
         declare_plugins(Fan, Cone)
-        files.write_map("room", ["##########", *["#........#"] * 8, "##########"])
         files.write(
             "robot.model.yaml",
             "bodies: [{name: b, footprints: []}]\n"
             "plugins: [{type: test::Fan, name: fan}, {type: test::Cone, name: cone}]",
         )
-        world = files.load(WORLD)
+        world = files.load(Path(world.path).read_text())
         viewer.add_world(world)
         with RawWebClient(viewer.url) as client:
             fan, cone = client.wait_model("robot")["lasers"]
