@@ -12,8 +12,8 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from nested import assert_same
 
-import flatland.gym
 from flatland.gym import FlatlandEnv, FlatlandVectorEnv
+from flatland.world import World
 
 Make = Callable[..., Any]
 
@@ -70,9 +70,7 @@ def make() -> Iterator[Make]:
     """Creates environments that are closed at the end of the test."""
     made: list[Any] = []
 
-    def create(
-        kind: Callable[..., Any] = flatland.gym.FlatlandEnv, *args: Any, **kwargs: Any
-    ) -> Any:
+    def create(kind: Callable[..., Any] = FlatlandEnv, *args: Any, **kwargs: Any) -> Any:
         env = kind(*args, **kwargs)
         made.append(env)
         return env
@@ -80,6 +78,20 @@ def make() -> Iterator[Make]:
     yield create
     for env in made:
         env.close()
+
+
+@pytest.fixture
+def created(monkeypatch: pytest.MonkeyPatch) -> list[World]:
+    """All worlds that were created."""
+    worlds: list[World] = []
+    initialize = World.__init__
+
+    def recorded(self: World, *arguments: Any, **options: Any) -> None:
+        initialize(self, *arguments, **options)
+        worlds.append(self)
+
+    monkeypatch.setattr(World, "__init__", recorded)
+    return worlds
 
 
 @pytest.fixture

@@ -15,12 +15,12 @@ from flatland.errors import StaleHandleError, WorldError, WorldLockedError
 from flatland.gym import FlatlandVectorEnv
 from flatland.gym.endings import Arrived
 from flatland.plugins.laser import Laser
-from flatland.runtime.jobs import Jobs
 from flatland.runtime.observer import WorldObserver
 from flatland.values import Twist
 
 Make = Callable[..., Any]
 COUNT, STEPS = 3, 40
+COMMANDS = np.tile([0.1, 0.0, 0.1], (COUNT, 1))
 
 
 class Watcher(WorldObserver):
@@ -45,8 +45,7 @@ def run(env: FlatlandVectorEnv, disturb: Callable[[int], None] | None = None) ->
         observations, rewards, terminated, truncated, infos = env.step(actions)
         values = [observations, rewards, terminated, truncated, *map(infos.get, sorted(infos))]
         results.append([np.asarray(value).tobytes() for value in values])
-        results.append([world.state_hash() for world in env._stage.worlds])
-        results.append([world.time for world in env._stage.worlds])
+        results.append([(world.state_hash(), world.time) for world in env.worlds])
     return results
 
 
@@ -62,21 +61,19 @@ def create(make: Make, world: str | Path) -> Any:
     )
 
 
-def begun(make: Make, room: Path) -> tuple[Any, Any, Any]:
-    """Returns environments after the first updates of plugins, commands, and who acts."""
-    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
+@pytest.fixture
+def env(make: Make, room: Path) -> Any:
+    """Environments whose episodes have begun, and last."""
+    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000, num_threads=2)
     env.reset(seed=0)
-    for _ in range(2):
-        env.step(np.full((COUNT, 2), 0.1))
-    return env, np.tile([0.1, 0.0, 0.1], (COUNT, 1)), np.ones(COUNT, np.bool_)
+    return env
 
 
 @pytest.mark.parametrize("world", ["room", "corridor"])
 def test_an_observer_does_not_change_results(make: Make, room: Path, world: str) -> None:
-    env = create(make, room if world == "room" else world)
-    watched = create(make, room if world == "room" else world)
+    env, watched = (create(make, room if world == "room" else world) for _ in range(2))
     watcher = Watcher()
-    watched._stage.worlds[1].add_observer(watcher)
+    watched.worlds[1].add_observer(watcher)
     assert run(watched) == run(env)
     # The core performs all steps between two calls of code at once.
     assert watcher.starts >= STEPS - 3
@@ -84,7 +81,7 @@ def test_an_observer_does_not_change_results(make: Make, room: Path, world: str)
 
 def test_requests_and_hooks_are_performed_in_their_step(make: Make, room: Path) -> None:
     env, other = create(make, room), create(make, room)
-    first, second = env._stage.worlds[0], other._stage.worlds[0]
+    first, second = env.worlds[0], other.worlds[0]
 
     def post(step: int) -> None:
         if step % 7 == 3:
@@ -97,40 +94,33 @@ def test_requests_and_hooks_are_performed_in_their_step(make: Make, room: Path) 
     assert run(env, post) == run(other, move)
 
 
-def test_a_paused_world_stands_still(make: Make, room: Path) -> None:
-    env = create(make, room)
-    env.reset(seed=0)
-    env._stage.worlds[0].pause()
+def test_a_paused_world_stands_still(env: Any) -> None:
+    env.worlds[0].pause()
     env.step(np.ones((COUNT, 2), np.float32))
-    times = [world.time for world in env._stage.worlds]
+    times = [world.time for world in env.worlds]
     assert times[0] == 0
     assert times[1] == times[2] > 0
 
 
-def test_an_exception_of_one_world_ends_the_steps_of_all(make: Make, room: Path) -> None:
-    env = create(make, room)
-    env.reset(seed=0)
+def test_an_exception_of_one_world_ends_the_steps_of_all(env: Any) -> None:
     env.step(np.zeros((COUNT, 2), np.float32))
-    env._stage.worlds[1].delete_model("robot")
+    env.worlds[1].delete_model("robot")
     with pytest.raises(StaleHandleError, match="removed"):
         env.step(np.ones((COUNT, 2), np.float32))
     # No world remains locked, and the other worlds have been stepped.
-    assert env._stage.worlds[0].time == env._stage.worlds[2].time == pytest.approx(0.2)
-    assert not env._stage.worlds[1].requests.lock._is_owned()
+    assert env.worlds[0].time == env.worlds[2].time == pytest.approx(0.2)
+    assert not env.worlds[1].requests.lock._is_owned()
 
 
-def test_first_updates_without_calls_have_the_same_results(
-    make: Make, room: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    env = create(make, room)
-    monkeypatch.setattr(Jobs, "omit_first_calls", lambda *_: None)
-    called = create(make, room)
-    assert run(env) == run(called)
+def test_subscribers_do_not_change_results(make: Make, room: Path) -> None:
+    env, subscribed = create(make, room), create(make, room)
+    scans: list[Any] = []
+    subscribed.worlds[1].output("/scan").subscribe(scans.append)
+    assert run(subscribed) == run(env)
+    assert len(scans) >= STEPS - 3
 
 
-def test_a_first_update_is_called_if_it_is_wanted(make: Make, room: Path) -> None:
-    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived())
-    env.reset(seed=0)
+def test_a_first_update_is_called_if_it_is_wanted(env: Any) -> None:
     first, second = (agent.laser for agent in env.episodes.agents[:2])
     calls: list[Laser] = []
     for laser in (first, second):
@@ -146,9 +136,7 @@ def test_a_first_update_is_called_if_it_is_wanted(make: Make, room: Path) -> Non
     assert len(calls) == count
 
 
-def test_a_command_has_the_last_value_of_the_core(make: Make, room: Path) -> None:
-    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
-    env.reset(seed=0)
+def test_a_command_has_the_last_value_of_the_core(env: Any) -> None:
     commands = [agent.command for agent in env.episodes.agents]
     for step in range(1, 5):
         actions = np.full((COUNT, 2), 0.1 * step)
@@ -169,10 +157,9 @@ def test_a_command_has_the_last_value_of_the_core(make: Make, room: Path) -> Non
 
 
 @pytest.mark.parametrize("change", ["on_set", "iterations", "pre_solve", "pause"])
-def test_changes_from_outside_end_the_permission_of_the_core(
-    make: Make, room: Path, change: str
-) -> None:
-    env, commands, ones = begun(make, room)
+def test_changes_from_outside_end_the_permission_of_the_core(env: Any, change: str) -> None:
+    for _ in range(2):  # with the first updates of plugins
+        env.step(np.full((COUNT, 2), 0.1))
     world = env.worlds[1]
     values: list[Twist] = []
     if change == "on_set":
@@ -185,13 +172,11 @@ def test_changes_from_outside_end_the_permission_of_the_core(
         world.pause()
     batch = env._episodes._batch
     for count in (1, 2):
-        assert batch.perform(commands, ones, 20, lambda: None).tolist() == [1]
+        assert batch.perform(COMMANDS, np.ones(COUNT, np.bool_), 20, lambda: None).tolist() == [1]
         assert len(values) == (count if change == "on_set" else 0)
 
 
-def test_a_hook_cannot_step_the_environment(make: Make, room: Path) -> None:
-    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
-    env.reset(seed=0)
+def test_a_hook_cannot_step_the_environment(env: Any) -> None:
     actions = np.zeros((COUNT, 2))
     errors: list[str] = []
 
@@ -207,9 +192,7 @@ def test_a_hook_cannot_step_the_environment(make: Make, room: Path) -> None:
     env.step(actions)
 
 
-def test_requests_wait_for_the_end_of_all_steps(make: Make, room: Path) -> None:
-    env = create(make, room)
-    env.reset(seed=0)
+def test_requests_wait_for_the_end_of_all_steps(env: Any) -> None:
     world, posted = env.worlds[1], threading.Event()
     world.requests._on_post = posted.set
     with env.worlds[0].requests.lock:
@@ -224,11 +207,8 @@ def test_requests_wait_for_the_end_of_all_steps(make: Make, room: Path) -> None:
     assert env.poses[1].tolist() == pytest.approx([3, 2, 1], abs=1e-4)
 
 
-def test_the_next_episodes_begin_while_other_worlds_step(make: Make, room: Path) -> None:
-    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000, num_threads=2)
-    env.reset(seed=0)
-    actions, acting = np.full((COUNT, 2), 0.1), np.array([True, False, True])
-    env.step(actions)
+def test_the_next_episodes_begin_while_other_worlds_step(env: Any) -> None:
+    env.step(np.full((COUNT, 2), 0.1))
     refused: list[int] = []
 
     def meanwhile() -> None:
@@ -238,24 +218,19 @@ def test_the_next_episodes_begin_while_other_worlds_step(make: Make, room: Path)
             except WorldLockedError:
                 refused.append(row)
 
-    batch, commands = env._episodes._batch, np.tile([0.1, 0.0, 0.1], (COUNT, 1))
-    assert batch.perform(commands, acting, 20, meanwhile).tolist() == []
+    acting = np.array([True, False, True])
+    assert env._episodes._batch.perform(COMMANDS, acting, 20, meanwhile).tolist() == []
     assert refused == [0, 2]
     assert env.poses[1].tolist() == pytest.approx([3.0, 2.0, 1.0])
     assert [world.time for world in env.worlds] == pytest.approx([0.2, 0.1, 0.2])
 
 
-def test_an_exception_while_worlds_step_leaves_them_complete(make: Make, room: Path) -> None:
-    env = make(FlatlandVectorEnv, COUNT, room, ending=Arrived(), max_steps=1000)
-    env.reset(seed=0)
-    actions, acting = np.full((COUNT, 2), 0.1), np.array([True, False, True])
-
+def test_an_exception_while_worlds_step_leaves_them_complete(env: Any) -> None:
     def fail() -> None:
         raise ValueError("no start")
 
-    commands = np.tile([0.1, 0.0, 0.1], (COUNT, 1))
     with pytest.raises(ValueError, match="no start"):
-        env._episodes._batch.perform(commands, acting, 20, fail)
+        env._episodes._batch.perform(COMMANDS, np.array([True, False, True]), 20, fail)
     assert [world.time for world in env.worlds] == pytest.approx([0.1, 0.0, 0.1])
-    env.step(actions)
+    env.step(np.full((COUNT, 2), 0.1))
     assert [world.time for world in env.worlds] == pytest.approx([0.2, 0.1, 0.2])

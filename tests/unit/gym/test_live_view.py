@@ -103,24 +103,20 @@ def test_environments_share_a_viewer_that_ends_with_the_last_of_them(
 def test_a_vector_of_environments_is_a_grid_of_worlds(
     make: Make, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    envs = flatland.gym.make_vec("flatland/Corridor-v0", num_envs=3, render_mode="human")
+    envs = make(flatland.gym.make_vec, "flatland/Corridor-v0", num_envs=3, render_mode="human")
     envs.reset(seed=[1, 2, 3])
     (url,) = printed_urls(capsys)
     with WebClient(url) as client:
         names = [world["name"] for world in client.hello["worlds"]]
         assert names == ["corridor 0", "corridor 1", "corridor 2"]
         envs.step(np.tile(AHEAD, (3, 1)))
-        goals = envs._episodes.situation.goals
-        for row, world in enumerate(envs._stage.worlds):
-            x, y, _ = world.model("robot").pose
+        for row, pose in enumerate(envs.poses):
+            place = pytest.approx(pose[:2], abs=1e-5)
             client.until(
-                "motion",
-                lambda row=row, x=x, y=y: client.pose("robot", row)[:2] == pytest.approx((x, y)),
+                "motion", lambda row=row, place=place: client.pose("robot", row)[:2] == place
             )
             center = goal_edges(client, row)[:, :2].mean(0)
-            assert center == pytest.approx(goals[row], abs=1e-3)
-    envs.close()
-    assert live_view.SHARED._viewer is None
+            assert center == pytest.approx(envs.goals[row], abs=1e-3)
 
 
 def test_all_goals_of_a_fleet_are_shown(make: Make, capsys: pytest.CaptureFixture[str]) -> None:
@@ -131,28 +127,6 @@ def test_all_goals_of_a_fleet_are_shown(make: Make, capsys: pytest.CaptureFixtur
         expected = list(env.goals.values())
         assert circles[:, :, :2].mean(1) == pytest.approx(np.array(expected), abs=1e-3)
         assert client.pose("robot_2") == pytest.approx(env.world.model("robot_2").pose, abs=1e-5)
-
-
-def test_a_client_does_not_affect_an_episode(
-    make: Make, room: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def episode(env: FlatlandEnv, client: WebClient | None) -> list[bytes]:
-        observation, _ = env.reset(seed=3)
-        found = [observation.tobytes()]
-        for action in np.random.default_rng(0).uniform(-1, 1, (5, 2)).astype(np.float32):
-            found.append(env.step(action)[0].tobytes())
-            if client is not None:
-                now = env.world.time
-                client.until(
-                    "step",
-                    lambda now=now: client.status()["time"] == pytest.approx(now, abs=1e-9),
-                )
-        return [*found, env.world.state_hash().encode()]
-
-    shown = make(FlatlandEnv, room, render_mode="human")
-    shown.reset(seed=3)
-    with WebClient(printed_urls(capsys)[0], scans=True) as client:
-        assert episode(shown, client) == episode(make(FlatlandEnv, room), None)
 
 
 def test_steps_take_their_simulated_time(

@@ -41,23 +41,6 @@ def test_actions_do_not_depend_on_other_environments(make: Make) -> None:
         observations = envs.step(actions)[0]
 
 
-def test_equal_episodes_have_equal_actions(make: Make) -> None:
-    env = make(FlatlandEnv)
-    policy = Policy(env=env)
-    runs = []
-    for _ in range(2):
-        policy.reset()
-        observation, _ = env.reset(seed=3)
-        actions = []
-        for _ in range(10):
-            actions.append(policy(observation))
-            observation, _, terminated, _, _ = env.step(actions[-1])
-            if terminated:
-                break
-        runs.append(np.array(actions).tobytes())
-    assert runs[0] == runs[1]
-
-
 def test_a_reset_applies_to_the_selected_episodes(make: Make) -> None:
     envs = make(FlatlandVectorEnv, 3)
     policy, fresh = Policy(), Policy()
@@ -67,34 +50,11 @@ def test_a_reset_applies_to_the_selected_episodes(make: Make) -> None:
     policy.reset(np.array((True, False, True)))
     after = policy(observations)
     np.testing.assert_array_equal(after[[0, 2]], first[[0, 2]])
-    np.testing.assert_array_equal(fresh(observations), first)
-    fresh.reset()
-    np.testing.assert_array_equal(fresh(observations), first)
-    assert later.shape == after.shape
-
-
-def test_an_evaluation_resets_the_state(make: Make) -> None:
-    class Recorder:
-        def __init__(self) -> None:
-            self.policy = Policy()
-            self.resets: list[list[bool]] = []
-
-        def __call__(self, observations: Any) -> Any:
-            return self.policy(observations)
-
-        def reset(self, rows: Any) -> None:
-            self.resets.append(rows.tolist())
-            self.policy.reset(rows)
-
-    found = []
-    for count in (3, 5):
-        envs = make(FlatlandVectorEnv, count, "corridor", autoreset_mode="SameStep")
-        recorder = Recorder()
-        found.append(evaluate(recorder, envs, 7, seed=2))
-        assert recorder.resets[0] == [True] * count
-        assert sum(map(sum, recorder.resets)) >= 7
-    np.testing.assert_array_equal(found[0].is_success, found[1].is_success)
-    np.testing.assert_array_equal(found[0].steps, found[1].steps)
+    assert (later[1] != first[1]).any()
+    assert (after[1] != first[1]).any()
+    for _ in range(2):
+        np.testing.assert_array_equal(fresh(observations), first)
+        fresh.reset()
 
 
 def test_a_policy_for_another_robot_is_an_error(make: Make) -> None:

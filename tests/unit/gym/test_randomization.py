@@ -98,9 +98,8 @@ def test_an_episode_depends_on_its_seed_only(make: Make) -> None:
 
     kwargs = {"world": "corridor", "randomization": ALL, "max_steps": 10}
     env = make(**kwargs)
-    for seed in (3, 1, 2, 3):
-        for one, other in zip(run(env, seed), run(make(**kwargs), seed), strict=True):
-            assert_same(one, other)
+    for seed in (3, 1, 3):
+        assert_same(run(env, seed), run(make(**kwargs), seed))
 
 
 def test_buildings_are_randomized(equals_singles: Callable[..., Any]) -> None:
@@ -109,15 +108,11 @@ def test_buildings_are_randomized(equals_singles: Callable[..., Any]) -> None:
 
 
 def test_robots_of_a_fleet_differ(make: Make) -> None:
-    runs = []
-    for _ in range(2):
-        env = make(make_parallel, num_robots=3, randomization=ALL)
-        env.reset(seed=4)
-        radii = [agent.body.fixtures[0].radius for agent in env._agents]
-        assert len(set(radii)) == 3
-        results = [env.step(dict.fromkeys(env.agents, FORWARD)) for _ in range(3)]
-        runs.append((radii, results))
-    assert_same(*runs)
+    env = make(make_parallel, num_robots=3, randomization=ALL)
+    env.reset(seed=4)
+    robots = map(env.world.model, env.agents)
+    assert len({robot.bodies[0].fixtures[0].radius for robot in robots}) == 3
+    env.step(dict.fromkeys(env.agents, FORWARD))
 
 
 def test_parts_of_one_object_are_independent_in_two_environments(make: Make) -> None:
@@ -205,18 +200,11 @@ def test_observations_are_those_of_an_earlier_step(make: Make) -> None:
 
 def test_the_limits_of_the_drive_are_scaled(make: Make) -> None:
     env = make(**fixed("corridor", DriveLimits((0.5, 0.5))))
-    assert speeds(env, 0, 8)[-1] == pytest.approx(0.5, abs=1e-3)
+    for seed in range(2):  # and not scaled twice
+        assert speeds(env, seed, 8)[-1] == pytest.approx(0.5, abs=1e-3)
     slow = make(**fixed("corridor", DriveLimits(acceleration=(0.25, 0.25))))
     assert speeds(slow, 0, 1) == pytest.approx([0.05], abs=1e-3)  # 0.25 * 2 m/s² * 0.1 s
     assert speeds(slow, 0, 21)[-1] == pytest.approx(1.0, abs=1e-3)
-
-
-def test_limits_are_not_scaled_twice(make: Make) -> None:
-    env = make(**fixed("corridor", DriveLimits((0.5, 0.5))))
-    for seed in range(5):
-        env.reset(seed=seed)
-    drive = env.world.model("robot").plugins[0]
-    assert drive.linear_dynamics.velocity_limit == 0.5
 
 
 def test_a_payload_makes_the_robot_slower(make: Make, pusher: Path) -> None:

@@ -1,12 +1,21 @@
-"""The part that all environments share: what remains after a failure."""
+"""The part that all environments share: what remains after their end or a failure."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NoReturn
 
 import pytest
+from gymnasium.error import ClosedEnvironmentError
 
-from flatland.gym import FlatlandVectorEnv, live_view, stage
+from flatland.gym import (
+    FlatlandEnv,
+    FlatlandVectorEnv,
+    FleetVectorEnv,
+    live_view,
+    make_parallel,
+    stage,
+)
 from flatland.world import World
 
 
@@ -18,53 +27,50 @@ def fail(*_: object, **__: object) -> NoReturn:
     raise BrokenError
 
 
-@pytest.fixture
-def worlds(monkeypatch: pytest.MonkeyPatch) -> list[World]:
-    """All worlds that were created."""
-    created: list[World] = []
-    initialize = World.__init__
-
-    def recorded(self: World, *arguments: Any, **options: Any) -> None:
-        initialize(self, *arguments, **options)
-        created.append(self)
-
-    monkeypatch.setattr(World, "__init__", recorded)
-    return created
+@pytest.mark.parametrize("kind", [FlatlandEnv, FlatlandVectorEnv, make_parallel, FleetVectorEnv])
+def test_a_closed_environment_is_of_no_use(make: Callable[..., Any], kind: Any) -> None:
+    env = make(kind)
+    env.reset(seed=0)
+    env.close()
+    env.close()
+    for use in (lambda: env.step({}), env.reset, env.render):
+        with pytest.raises(ClosedEnvironmentError, match="closed"):
+            use()
 
 
 @pytest.mark.parametrize("part", ["EpisodeView", "Episodes"])
 def test_a_failed_environment_leaves_no_world(
-    part: str, worlds: list[World], monkeypatch: pytest.MonkeyPatch
+    part: str, created: list[World], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(stage, part, fail)
     with pytest.raises(BrokenError):
         FlatlandVectorEnv(3)
-    assert worlds
-    assert all(world.closed for world in worlds)
+    assert created
+    assert all(world.closed for world in created)
 
 
 def test_a_failed_clone_leaves_no_world(
-    worlds: list[World], monkeypatch: pytest.MonkeyPatch
+    created: list[World], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clone = World.clone
 
     def clone_once(self: World) -> World:
-        return clone(self) if len(worlds) < 2 else fail()
+        return clone(self) if len(created) < 2 else fail()
 
     monkeypatch.setattr(World, "clone", clone_once)
     with pytest.raises(BrokenError):
         FlatlandVectorEnv(4)
-    assert [world.closed for world in worlds] == [True, True]
+    assert [world.closed for world in created] == [True, True]
 
 
 def test_worlds_are_closed_if_their_view_fails_to_close(
-    worlds: list[World], monkeypatch: pytest.MonkeyPatch
+    created: list[World], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     envs = FlatlandVectorEnv(2)
     monkeypatch.setattr(live_view.EpisodeView, "close", fail)
     with pytest.raises(BrokenError):
         envs.close()
-    assert all(world.closed for world in worlds)
+    assert all(world.closed for world in created)
 
 
 def test_a_world_that_cannot_be_shown_leaves_no_viewer(monkeypatch: pytest.MonkeyPatch) -> None:

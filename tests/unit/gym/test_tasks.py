@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ClosedEnvironmentError
-from gymnasium.vector import AsyncVectorEnv
 from nested import assert_same
 
 import flatland
-from flatland.gym import Buildings, FixedGoal, FlatlandVectorEnv, RandomGoal, make_parallel
+from flatland.gym import Buildings, FixedGoal, FlatlandVectorEnv, RandomGoal
 
 Make = Callable[..., Any]
 
@@ -39,6 +36,7 @@ def rooms(room: Path) -> Path:
 
 
 def draws(make: Make, n: int, world: Path, task: RandomGoal) -> np.ndarray:
+    """Returns the starts and goals of n episodes."""
     env = make(world=world, task=task)
     rows = []
     for seed in range(n):
@@ -96,17 +94,12 @@ def test_a_robot_without_a_place_gets_the_largest_region(make: Make, rooms: Path
     assert drawn[:, 0].min() > 3
 
 
-def test_a_world_without_walls_is_an_error(make: Make, room: Path) -> None:
-    (room.parent / "robot.model.yaml").write_text((room.parent / "robot.model.yaml").read_text())
-    text = room.read_text().replace("layers: [{name: walls, map: map.yaml}]", "layers: []")
-    room.write_text(text)
-    with pytest.raises(flatland.WorldError, match="no layer has walls"):
-        make(world=room)
-
-
-def test_a_map_without_room_is_an_error(make: Make, room: Path) -> None:
+def test_a_world_without_walls_or_room_is_an_error(make: Make, room: Path) -> None:
     with pytest.raises(flatland.WorldError, match="no place is free"):
         make(world=room, task=RandomGoal(clearance=3.0))
+    room.write_text(room.read_text().replace("[{name: walls, map: map.yaml}]", "[]"))
+    with pytest.raises(flatland.WorldError, match="no layer has walls"):
+        make(world=room)
 
 
 def test_a_fixed_goal_is_that_of_each_episode(make: Make, room: Path) -> None:
@@ -119,9 +112,8 @@ def test_a_fixed_goal_is_that_of_each_episode(make: Make, room: Path) -> None:
 
 def test_a_fixed_goal_without_a_path_is_an_error(make: Make, rooms: Path) -> None:
     make(world=rooms, task=FixedGoal((1, 2, 0), (2, 3)))  # in the closed room
-    for goal, reason in (((4, 3), "no path of a disc of radius 0.2 m"), ((60, 0), "outside")):
-        with pytest.raises(flatland.WorldError, match=f"goal .* cannot be reached: .*{reason}"):
-            make(world=rooms, task=FixedGoal((1, 2, 0), goal))
+    with pytest.raises(flatland.WorldError, match=r"goal .* cannot be .* disc of radius 0\.2 m"):
+        make(world=rooms, task=FixedGoal((1, 2, 0), (4, 3)))
 
 
 def test_places_around_open_walls_are_connected(make: Make, rooms: Path) -> None:
@@ -149,34 +141,18 @@ def test_places_around_open_walls_are_connected(make: Make, rooms: Path) -> None
         {"distance": (1.0, math.inf)},
         {"goal_radius": 0.0},
         {"margin": -1.0},
+        {"clearance": -0.1},
     ],
 )
-def test_an_invalid_number_is_an_error(arguments: dict[str, Any]) -> None:
+def test_an_invalid_number_is_an_error(make: Make, arguments: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=next(iter(arguments))):
-        RandomGoal(**arguments)
-
-
-def test_an_invalid_clearance_is_an_error(make: Make, room: Path) -> None:
-    with pytest.raises(ValueError, match="clearance"):
-        make(world=room, task=RandomGoal(clearance=-0.1))
+        make(world="corridor", task=RandomGoal(**arguments))
 
 
 # -- curricula: the task changes between episodes ------------------------------------------------
 
 FORWARD = np.array([1.0, 0.2], np.float32)
 NEAR, FAR = RandomGoal((0.5, 1.0)), RandomGoal((4.0, 6.0))
-
-
-def test_the_next_episodes_have_the_new_task(make: Make) -> None:
-    env = make(gymnasium.make, "flatland/Corridor-v0", task=NEAR)
-    assert env.reset(seed=0)[1]["distance"] <= 1.0
-    env.unwrapped.task = FAR
-    assert env.unwrapped.task is FAR
-    assert env.reset(seed=0)[1]["distance"] >= 4.0
-    other = make(world="corridor", task=FAR)
-    env.reset(seed=1)
-    other.reset(seed=1)
-    assert env.unwrapped.goal == other.goal
 
 
 def test_a_running_episode_continues_exactly(make: Make) -> None:
@@ -198,28 +174,13 @@ def test_all_environments_of_a_vector_have_the_new_task(make: Make, world: Any) 
     for _ in range(7):
         envs.step(np.tile(FORWARD, (4, 1)))
     envs.task = FAR
+    assert envs.task is FAR
     _, infos = envs.reset(seed=1)
     assert (infos["distance"] >= 4.0).all()
     new = make(FlatlandVectorEnv, 4, world, task=FAR, autoreset_mode="SameStep", max_steps=5)
     new.reset(seed=1)
     np.testing.assert_array_equal(envs.goals, new.goals)
     np.testing.assert_array_equal(envs.poses, new.poses)
-
-
-def test_processes_take_a_new_task(make: Make) -> None:
-    creators = [partial(gymnasium.make, "flatland/Corridor-v0", task=NEAR)] * 2
-    envs = make(AsyncVectorEnv, creators)
-    envs.reset(seed=0)
-    envs.set_attr("task", FAR)
-    assert (envs.reset(seed=0)[1]["distance"] >= 4.0).all()
-
-
-def test_a_fleet_takes_a_new_task(make: Make) -> None:
-    env = make(make_parallel, num_robots=2, task=NEAR)
-    env.reset(seed=0)
-    env.task = FAR
-    infos = env.reset(seed=0)[1]
-    assert all(info["distance"] >= 4.0 for info in infos.values())
 
 
 def test_an_impossible_task_is_an_error_and_the_previous_one_remains(make: Make) -> None:

@@ -29,21 +29,18 @@ def logger() -> Iterator[logging.Logger]:
 
 @pytest.mark.parametrize("level", [logging.NOTSET, logging.ERROR])
 def test_the_log_is_forwarded_once_at_the_level_of_rospy(
-    logger: logging.Logger, monkeypatch: pytest.MonkeyPatch, level: int
+    logger: logging.Logger, master: Any, monkeypatch: pytest.MonkeyPatch, level: int
 ) -> None:
     name = "/rosout_disable_topics_generation"
-    asked: list[tuple[str, Any]] = []
-
-    def get_param(*arguments: Any) -> str:
-        asked.append(arguments)
-        return "value"
-
-    monkeypatch.setattr(rospy, "get_param", get_param)
+    cache = get_param_server_cache()
+    monkeypatch.setattr(cache, "d", {})
     logger.setLevel(level)
-    for _ in range(2):
-        logs.log_to_ros()
-    assert asked == [(name, False)] * 2
-    assert get_param_server_cache().get(name) == "value"
+    logs.log_to_ros()
+    assert cache.get(name) is False
+    cache.delete(name)
+    rospy.set_param(name, "value")
+    logs.log_to_ros()
+    assert cache.get(name) == "value"
     assert not logger.propagate
     assert len(logger.handlers) == 1
     assert logger.level == (level or logging.DEBUG)

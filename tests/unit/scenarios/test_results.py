@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import html.parser
-import json
 import math
 import xml.etree.ElementTree as ElementTree
 
@@ -49,9 +48,10 @@ def results():
 
 def test_results_are_read_as_they_were_written(results, tmp_path):
     write_results(results, tmp_path)
+    assert "NaN" not in (tmp_path / "results.json").read_text()
     found = read_results(tmp_path)
     assert found.rows == results.rows
-    assert found.definition == "abc"
+    assert (found.definition, found.missing) == ("abc", 0)
     lines = [[list(point) for point in line] for line in SQUARE]
     assert found.outlines == {"k": lines}
     assert found.lines_of(found.results[1]) == lines
@@ -81,11 +81,8 @@ def test_junit(results, tmp_path):
     write_junit(results, tmp_path / "junit.xml")
     root = ElementTree.parse(tmp_path / "junit.xml").getroot()
     suites = {suite.get("name"): suite for suite in root}
-    counts = {
-        name: (suite.get("tests"), suite.get("failures"), suite.get("errors"))
-        for name, suite in suites.items()
-    }
-    assert counts == {"s": ("2", "1", "0"), "t": ("1", "0", "1")}
+    for name, counts in (("s", ["2", "1", "0"]), ("t", ["1", "0", "1"])):
+        assert list(map(suites[name].get, ("tests", "failures", "errors"))) == counts
     good, bad = suites["s"]
     assert (good.get("name"), list(good)) == ("s/a seed 0", [])
     assert bad[0].get("message") == "<reached> & more?"
@@ -173,7 +170,7 @@ def test_the_worst_runs_are_first(results):
 class Page(html.parser.HTMLParser):
     """Checks that elements are nested, and collects them."""
 
-    VOID = ("meta", "br", "circle", "rect", "path", "link", "img")
+    VOID = ("meta", "br", "link", "img")
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -185,7 +182,7 @@ class Page(html.parser.HTMLParser):
 
     def handle_starttag(self, tag, attrs):
         self.elements.append((tag, dict(attrs)))
-        if tag not in self.VOID or tag in ("circle", "rect", "path"):
+        if tag not in self.VOID:
             self.open.append(tag)
 
     def handle_startendtag(self, tag, attrs):
@@ -239,10 +236,3 @@ def test_sketches_have_the_shape_of_the_world(results):
     assert lines[start].index("S") < lines[end].index("X")
     assert "•" in text
     assert sketch(results.results[2], []) == ""
-
-
-def test_values_of_json_are_plain(results, tmp_path):
-    write_results(results, tmp_path)
-    text = (tmp_path / "results.json").read_text()
-    assert "NaN" not in text
-    assert json.loads(text)["missing"] == 0

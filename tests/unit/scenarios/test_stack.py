@@ -205,12 +205,18 @@ def test_the_error_of_the_localization_is_measured(drive):
 
 def test_a_stack_that_fails_is_a_failed_run(drive, monkeypatch):
     monkeypatch.setattr("flatland.scenarios.workers.MAX_ATTEMPTS", 1)  # of the mode `kills`
-    modes = ["ends", "absent", "nan", "silent", "kills"]
-    rows = dict(zip(modes, drive(*modes), strict=True))
-    assert {row["outcome"] for row in rows.values()} == {"error"}
+    # The first two take the longest time, and run at the same time.
+    modes = ["silent", "stops", "ends", "absent", "nan", "kills"]
+    text = TEXT.replace("[reached, no contact]", "[no contact]")
+    rows = dict(zip(modes, drive(*modes, text=text), strict=True))
+    stops = rows.pop("stops")
+    assert (stops["outcome"], stops["success"]) == ("gave_up", False), stops["error"]
+    assert stops["error"] == "the stack sent no command for 10 s"
+    # It has driven: as for a time limit, only the conditions decide.
+    assert (stops["passed"], stops["failures"]) == (True, None)
+    assert {(row["outcome"], row["passed"]) for row in rows.values()} == {("error", False)}
     errors = {mode: row["error"] for mode, row in rows.items()}
-    assert "the program has ended with exit code 0" in errors["ends"]
-    assert "its last output: " in errors["ends"]
+    assert "the program has ended with exit code 0; its last output: " in errors["ends"]
     assert "the battery is empty" in errors["ends"]
     assert "\033" not in errors["ends"]
     assert "the program has ended with exit code 4; its last output: no battery" in errors["absent"]
@@ -237,11 +243,6 @@ def test_a_stack_that_gives_up_has_failed(drive):
     # The measures are those until then.
     assert 0 < aborted["time"] < 5
     assert aborted["steps"] > 0
-    (silent,) = drive("stops", text=TEXT.replace("[reached, no contact]", "[no contact]"))
-    assert (silent["outcome"], silent["success"]) == ("gave_up", False), silent["error"]
-    assert silent["error"] == "the stack sent no command for 10 s"
-    # As for a time limit, only the conditions decide.
-    assert (silent["passed"], silent["failures"]) == (True, None)
 
 
 def test_a_stack_that_is_not_ready_in_time_is_a_failed_run(drive):
@@ -280,7 +281,8 @@ def test_the_name_of_a_stack_is_checked(room):
             find_controller(name, str(room))
 
 
-def test_a_program_ends_with_all_its_processes(tmp_path):
+def test_a_program_ends_with_all_its_processes(tmp_path, monkeypatch):
+    monkeypatch.setattr("flatland.scenarios.programs._END_TIMEOUT", 0.1)
     marker = math.pi * 1e6
     script = f"setsid sleep {marker} & trap '' TERM; echo started; sleep {marker}"
     program = Program([shutil.which("bash") or "bash", "-c", script], {}, str(tmp_path))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -14,7 +13,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="ROS is not installed")
 
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped
+from geometry_msgs.msg import Point, PoseStamped, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid, Path
 from std_msgs.msg import Float64
 from tf2_msgs.msg import TFMessage
@@ -146,19 +145,26 @@ class Transport:
 
 
 class Simulation:
-    """A simulation whose world has the transforms of the test."""
+    """A simulation whose world has the transforms of the test.
+
+    Attributes:
+        error: Raised instead of a response, None for no error.
+        limits: Times for which responses were awaited [s].
+    """
 
     def __init__(self) -> None:
         self.world = SimpleNamespace(transforms={})
         self.error: Exception | None = None
+        self.limits: list[float] = []
 
-    def post(self, action: Callable[[], Any]) -> Future[Any]:
-        future: Future[Any] = Future()
-        if self.error is not None:
-            future.set_exception(self.error)
-        else:
-            future.set_result(action())
-        return future
+    def post(self, action: Callable[[], Any]) -> Any:
+        def result(timeout: float) -> Any:
+            self.limits.append(timeout)
+            if self.error is not None:
+                raise self.error
+            return action()
+
+        return SimpleNamespace(result=result)
 
 
 class Setup:
@@ -200,6 +206,14 @@ def path(*xs: float, frame: str = "map") -> Path:
         each.pose.position.x = x
         each.pose.orientation.w = 1.0
         message.poses.append(each)
+    return message
+
+
+def grid(*cells: int) -> OccupancyGrid:
+    message = OccupancyGrid(data=cells)
+    message.header.frame_id = "map"
+    message.info.width, message.info.height, message.info.resolution = len(cells), 1, 0.5
+    message.info.origin.orientation.w = 1.0
     return message
 
 
@@ -337,22 +351,19 @@ def test_a_drawing_returns_after_a_transform_was_missing(setup: Setup) -> None:
 def test_an_invalid_message_removes_the_drawing(setup: Setup) -> None:
     setup.graph.published = {"/map": "nav_msgs/OccupancyGrid", "/plan": "nav_msgs/Path"}
     setup.update(drawn="/map /plan")
-    grid = OccupancyGrid()
-    grid.header.frame_id = "map"
-    grid.info.width, grid.info.height, grid.info.resolution = 2, 1, 0.5
-    grid.info.origin.orientation.w = 1.0
-    grid.data = [0, 100]
-    setup.receive("/map", grid)
+    setup.receive("/map", grid(0, 100))
     drawing = setup.update(drawn="/map /plan").drawings["/map"]
     assert isinstance(drawing, Grid)
     assert drawing.cells.tolist() == [[0, 100]]
-    setup.receive("/map", OccupancyGrid(header=grid.header, info=grid.info, data=[1]))
+    invalid = grid(0, 100)
+    invalid.data = [1]
+    setup.receive("/map", invalid)
     update = setup.update(drawn="/map /plan")
     reason = "a grid of 2 x 1 cells must have that number of values, got 1"
     assert update.topics[0].status == f"invalid message: Flatland File: {reason}"
     assert xs(update.drawings["/map"]) == []
     assert setup.update(drawn="/map /plan").drawings == {}
-    setup.receive("/map", grid)
+    setup.receive("/map", grid(0, 100))
     update = setup.update(drawn="/map /plan")
     assert update.topics[0].status == ""
     assert isinstance(update.drawings["/map"], Grid)
@@ -381,19 +392,12 @@ def test_all_markers_count_and_all_updates_of_a_grid(setup: Setup, caplog: Any) 
         setup.update(drawn="/marks /map")
         assert setup.transport.open().count("/map_updates") == 1
     for number in range(3):
-        marker = Marker(type=Marker.POINTS, id=number)
+        marker = Marker(type=Marker.POINTS, id=number, points=[Point(number, 0, 0)])
         marker.header.frame_id = "map"
-        marker.pose.position.x = float(number)
-        marker.pose.orientation.w = 1.0
-        marker.points = [marker.pose.position.__class__()]
-        marker.scale.x = marker.scale.y = marker.color.a = 1.0
+        marker.pose.orientation.w = marker.scale.x = marker.scale.y = marker.color.a = 1.0
         setup.receive("/marks", marker)
     assert xs(setup.update(drawn="/marks /map").drawings["/marks"]) == [0.0, 1.0, 2.0]
-    grid = OccupancyGrid(data=[0, 0, 0])
-    grid.header.frame_id = "map"
-    grid.info.width, grid.info.height, grid.info.resolution = 3, 1, 1.0
-    grid.info.origin.orientation.w = 1.0
-    setup.receive("/map", grid)
+    setup.receive("/map", grid(0, 0, 0))
     for x in range(2):
         part = SimpleNamespace(x=x, y=0, width=1, height=1, data=[100])
         setup.receive("/map_updates", part)
@@ -483,19 +487,7 @@ def test_a_world_that_does_not_answer_prevents_no_drawing(setup: Setup, error: E
     setup.update(drawn="/plan")
     setup.receive("/plan", path(1.0, 2.0))
     assert xs(setup.update(drawn="/plan").drawings["/plan"]) == [1.0, 2.0]
-
-
-def test_a_world_whose_plugin_blocks_is_not_waited_for(setup: Setup) -> None:
-    limits: list[float] = []
-
-    def result(timeout: float) -> list[Any]:
-        limits.append(timeout)
-        return []
-
-    setup.simulation.post = lambda _action: SimpleNamespace(result=result)  # type: ignore[method-assign,assignment,return-value]
-    setup.graph.published = {"/plan": "nav_msgs/Path"}
-    setup.update(drawn="/plan")
-    assert limits == [1.0]
+    assert setup.simulation.limits == [1.0]  # A world whose plugin blocks is not waited for.
 
 
 def test_transforms_that_cannot_be_received_are_a_warning(setup: Setup, caplog: Any) -> None:

@@ -10,7 +10,6 @@ import pytest
 from visualization_msgs.msg import Marker, MarkerArray
 
 import flatland
-import flatland.geometry
 from flatland.node.markers.model_markers import ModelMarkers
 from flatland.ros.adapters.writer import RosWriter
 
@@ -71,23 +70,6 @@ def test_markers_are_created_again_only_if_the_appearance_has_changed(model: Any
     assert cached.message(STAMP) is first
     model.bodies[1].color = (0.0, 1.0, 0.0, 1.0)
     assert cached.message(STAMP) is not first
-
-
-def test_joints_connect_the_origins_and_the_anchors(model: Any) -> None:
-    cached = ModelMarkers(model, RosWriter)
-    cached.message(0)
-    model.bodies[1].set_pose(-4.0, 0.5, 2.0)
-    lines, cubes = markers_of(cached.message(STAMP))[-2:]
-    arm, base = model.bodies[1].pose, model.bodies[0].pose
-    anchor_a, anchor_b = (
-        flatland.geometry.compose(pose, (*anchor, 0.0))
-        for pose, anchor in zip((arm, base), model.joints[0].anchors, strict=True)
-    )
-    expected = [(*pose[:2], 0.0) for pose in (arm, anchor_a, base, anchor_b)]
-    found = [(p.x, p.y, p.z) for p in cubes.points]
-    assert found == expected
-    found = [(p.x, p.y, p.z) for p in lines.points]
-    assert found == [expected[i] for i in (0, 1, 2, 3, 1, 3)]
 
 
 def test_changed_footprints_and_colors_are_rebuilt(model: Any) -> None:

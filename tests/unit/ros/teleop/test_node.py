@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import ANY
 
 import pytest
 
@@ -78,6 +78,12 @@ class Terminal:
 
     def write(self, text: str) -> None:
         self.written += text
+
+    def __enter__(self) -> Terminal:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.write("(restored)")
 
 
 @pytest.fixture
@@ -175,82 +181,50 @@ def test_the_status_is_written_when_it_changes(
     ]
 
 
-def test_text_is_written_until_the_terminal_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
-    reading_end, writing_end = os.pipe()
-    monkeypatch.setattr(sys, "stdout", SimpleNamespace(fileno=lambda: writing_end))
-    node._write("größer")
-    assert os.read(reading_end, 100) == "größer".encode()
-    os.close(reading_end)
-    node._write("closed")  # a broken pipe
-    os.close(writing_end)
-
-
 # -- the start -------------------------------------------------------------------------------------
 
 
 @pytest.fixture
-def ros(monkeypatch: pytest.MonkeyPatch, terminal: Terminal) -> SimpleNamespace:
-    """Replaces rospy, and records in `calls` what the program does.
-
-    Attributes:
-        parameters: The private parameters.
-        online: Whether there is a ROS master; an error for an invalid address.
-    """
-    rospy = pytest.importorskip("rospy", reason="ROS is not installed")
-    import rosgraph
+def ros(
+    master: Any, monkeypatch: pytest.MonkeyPatch, terminal: Terminal, publisher: Publisher
+) -> list[Any]:
+    """Replaces the node, of which a process has one; returns the calls."""
+    import rospy
 
     from flatland.ros import logs
-    from flatland.ros.transport import publisher, registrar
+    from flatland.ros.transport import publisher as publishers
+    from flatland.ros.transport import registrar
 
-    state = SimpleNamespace(calls=[], parameters={}, online=True, hooks=[])
+    calls: list[Any] = []
 
-    def is_online() -> bool:
-        if isinstance(state.online, Exception):
-            raise state.online
-        return bool(state.online)
+    def record(name: str, result: Any = None) -> Callable[..., Any]:
+        def call(*arguments: Any, **options: Any) -> Any:
+            calls.append((name, *arguments, *options.items()))
+            return result
 
-    class Registrar:
-        def flush(self, timeout: float) -> bool:
-            state.calls.append(("flush", timeout))
-            return True
+        return call
 
-    def advertise(given: Any, topic: str, message_type: type[Any]) -> Publisher:
-        assert isinstance(given, Registrar)
-        state.calls.append(("advertise", topic, message_type._type))
-        state.publisher = Publisher()
-        return state.publisher
-
-    class KeyInput:
-        def __init__(self, fd: int) -> None:
-            state.calls.append(("terminal", fd))
-
-        def __enter__(self) -> Terminal:
-            return terminal
-
-        def __exit__(self, *_: object) -> None:
-            state.calls.append(("terminal restored", list(state.publisher.sent)))
-
-    record = state.calls.append
-    monkeypatch.setattr(rosgraph, "is_master_online", is_online)
-    monkeypatch.setattr(rosgraph, "get_master_uri", lambda: "http://robot:11311")
-    monkeypatch.setattr(rospy, "init_node", lambda name, **options: record((name, options)))
-    monkeypatch.setattr(
-        rospy, "get_param", lambda name, default: state.parameters.get(name, default)
-    )
-    monkeypatch.setattr(rospy, "on_shutdown", state.hooks.append)
-    monkeypatch.setattr(rospy, "signal_shutdown", lambda reason: record(("shutdown", reason)))
-    monkeypatch.setattr(logs, "log_to_ros", lambda: record("log"))
-    monkeypatch.setattr(registrar, "Registrar", Registrar)
-    monkeypatch.setattr(publisher, "Publisher", advertise)
-    state.stop = SimpleNamespace(request=lambda: None)
-    monkeypatch.setattr(node, "StopRequests", lambda: state.stop)
-    monkeypatch.setattr(node, "KeyInput", KeyInput)
+    node_registrar = SimpleNamespace(flush=record("flush"))
+    monkeypatch.setattr(rospy, "init_node", record("node"))
+    monkeypatch.setattr(rospy, "on_shutdown", record("on shutdown"))
+    monkeypatch.setattr(rospy, "signal_shutdown", record("shutdown"))
+    monkeypatch.setattr(logs, "log_to_ros", record("log"))
+    monkeypatch.setattr(registrar, "Registrar", lambda: node_registrar)
+    monkeypatch.setattr(publishers, "Publisher", record("advertise", publisher))
+    monkeypatch.setattr(node, "StopRequests", lambda: SimpleNamespace(request="stop"))
+    monkeypatch.setattr(node, "KeyInput", record("terminal", terminal))
     monkeypatch.setattr(sys, "stdin", SimpleNamespace(isatty=lambda: True, fileno=lambda: 7))
-    return state
+    return calls
 
 
-def test_the_program_starts_drives_and_ends(ros: SimpleNamespace, terminal: Terminal) -> None:
-    ros.parameters = {"~max_linear": 0.4, "~max_angular": 3.0, "~rate": 10.0, "~key_timeout": 0.3}
+def test_the_program_starts_drives_and_ends(
+    ros: list[Any], terminal: Terminal, publisher: Publisher
+) -> None:
+    import rospy
+    from geometry_msgs.msg import Twist
+
+    parameters = {"max_linear": 0.4, "max_angular": 3.0, "rate": 10.0, "key_timeout": 0.3}
+    rospy.set_param(rospy.get_name(), parameters)
     terminal.script = [
         (0.0, b"q"),
         (0.0, None),
@@ -261,57 +235,66 @@ def test_the_program_starts_drives_and_ends(ros: SimpleNamespace, terminal: Term
         (0.0, Terminal.STOP),
     ]
     assert node.main() == 0
-    options = {"anonymous": True, "disable_signals": True, "disable_rostime": True}
-    moving, back = [(0.2, 1.5)], [(-0.2, 1.5)]
-    assert ros.calls == [
-        ("teleop_key", options),
-        "log",
-        ("advertise", "cmd_vel", "geometry_msgs/Twist"),
+    options = [("anonymous", True), ("disable_signals", True), ("disable_rostime", True)]
+    assert ros == [
+        ("node", "teleop_key", *options),
+        ("log",),
+        ("on shutdown", "stop"),
+        ("advertise", ANY, "cmd_vel", Twist),
         ("flush", 5.0),
         ("terminal", 7),
-        ("terminal restored", [*moving * 3, (0.0, 0.0), *back]),
         ("shutdown", "end of the teleoperation"),
     ]
-    assert ros.publisher.sent[-2:] == [*back, (0.0, 0.0)]
-    assert ros.hooks == [ros.stop.request]
+    assert publisher.sent == [(0.2, 1.5)] * 3 + [(0.0, 0.0), (-0.2, 1.5), (0.0, 0.0)]
     assert terminal.timeouts[1] == 0.1  # the period
     assert terminal.written.startswith(f"{USAGE}\n\r")
-    assert terminal.written.endswith("\n")
+    assert terminal.written.endswith("(restored)\n")
 
 
-def test_a_program_that_fails_stops_the_robot(ros: SimpleNamespace, terminal: Terminal) -> None:
+def test_a_program_that_fails_stops_the_robot(
+    ros: list[Any], terminal: Terminal, publisher: Publisher
+) -> None:
     terminal.script = [(0.0, b"w")]  # then the wait fails
     with pytest.raises(IndexError):
         node.main()
-    assert ros.publisher.sent == [(TeleopParameters().max_linear / 2, 0.0), (0.0, 0.0)]
-    assert terminal.written.endswith("\n")
-    assert ros.calls[-1] == ("shutdown", "end of the teleoperation")
+    assert publisher.sent == [(TeleopParameters().max_linear / 2, 0.0), (0.0, 0.0)]
+    assert terminal.written.endswith("(restored)\n")
+    assert ros[-1] == ("shutdown", "end of the teleoperation")
 
 
 def test_an_invalid_parameter_ends_the_program(
-    ros: SimpleNamespace, caplog: pytest.LogCaptureFixture
+    ros: list[Any], caplog: pytest.LogCaptureFixture
 ) -> None:
-    ros.parameters = {"~rate": 0.0}
+    import rospy
+
+    rospy.set_param("~rate", 0.0)
     assert node.main() == 1
-    assert ros.calls[-1] == ("shutdown", "invalid parameter")
+    assert ros[-1] == ("shutdown", "invalid parameter")
     [record] = caplog.records
     assert record.levelname == "CRITICAL"
     assert record.getMessage().startswith('Invalid parameter "~rate": ')
 
 
 @pytest.mark.parametrize(
-    ("online", "text"),
+    ("uri", "text"),
     [
-        (False, "no ROS master at http://robot:11311: start the simulator first"),
-        (ValueError("invalid port"), "invalid port (from ROS_MASTER_URI)"),
+        (
+            "http://127.0.0.1:1",
+            "no ROS master at http://127.0.0.1:1: start the simulator first",
+        ),
+        ("nonsense", "invalid master URI: nonsense (from ROS_MASTER_URI)"),
     ],
 )
 def test_the_program_needs_a_master(
-    ros: SimpleNamespace, capsys: pytest.CaptureFixture[str], online: Any, text: str
+    ros: list[Any],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    uri: str,
+    text: str,
 ) -> None:
-    ros.online = online
+    monkeypatch.setenv("ROS_MASTER_URI", uri)
     assert node.main() == 1
-    assert ros.calls == []
+    assert ros == []
     assert capsys.readouterr() == ("", f"teleop_key: {text}\n")
 
 

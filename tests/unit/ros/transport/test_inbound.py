@@ -65,12 +65,8 @@ class Port:
 
     def __init__(self, handlers: Handlers) -> None:
         self.server = TcprosServer(handlers.handle)
-        serve = TcprosServer._serve
-        TcprosServer._serve = lambda server, _number: setattr(server, "is_shutdown", True)
-        try:
-            self.server.run()  # creates the state only
-        finally:
-            TcprosServer._serve = serve
+        self.server.is_shutdown = True
+        self.server.run()  # creates the state only
         self.server.is_shutdown = False
         self._clients: list[socket.socket] = []
 
@@ -107,6 +103,15 @@ class Port:
             client.close()
 
 
+def _failing(number: int) -> Any:
+    """Returns a listening socket that accepts no connections."""
+
+    def accept() -> Any:
+        raise OSError(number, "cause")
+
+    return SimpleNamespace(accept=accept)
+
+
 def _has_input(client: socket.socket) -> bool:
     """Returns whether a client has received data or the end of its connection."""
     client.setblocking(False)
@@ -126,6 +131,8 @@ def handlers(monkeypatch: pytest.MonkeyPatch) -> Iterator[Handlers]:
     monkeypatch.setenv("ROS_IP", "127.0.0.1")
     monkeypatch.setattr(rospy.core, "is_shutdown_requested", lambda: False)
     monkeypatch.setattr(inbound, "_POLL_PERIOD", 0.1)
+    for limit in ("MAX_CLIENTS", "MAX_CONNECTIONS"):
+        monkeypatch.setattr(inbound, limit, 2)
     handlers = Handlers()
     yield handlers
     for *_, connection in handlers.accepted:
@@ -133,16 +140,11 @@ def handlers(monkeypatch: pytest.MonkeyPatch) -> Iterator[Handlers]:
 
 
 @pytest.fixture
-def open_port(handlers: Handlers) -> Iterator[Callable[[], Port]]:
-    ports: list[Port] = []
-
-    def create() -> Port:
-        ports.append(Port(handlers))
-        return ports[-1]
-
-    yield create
-    for port in ports:
-        port.close()
+def port(handlers: Handlers) -> Iterator[Port]:
+    """A server with at most two incomplete headers and two connections."""
+    port = Port(handlers)
+    yield port
+    port.close()
 
 
 @pytest.fixture
@@ -182,9 +184,8 @@ def test_limits_are_those_of_the_documentation(checkout: Path) -> None:
 
 @pytest.mark.parametrize(("kind", "fields"), [("topic", CLOCK), ("service", DELETE)])
 def test_a_complete_header_is_passed_on_without_what_follows_it(
-    open_port: Any, handlers: Handlers, warnings_of: Any, kind: str, fields: dict[str, str]
+    port: Port, handlers: Handlers, warnings_of: Any, kind: str, fields: dict[str, str]
 ) -> None:
-    port = open_port()
     data = tcpros.header(fields)
     client = port.connect(data[:2])
     for part in (data[2:4], data[4:11], data[11:-1]):
@@ -214,7 +215,7 @@ def test_a_complete_header_is_passed_on_without_what_follows_it(
     ],
 )
 def test_a_refused_connection_receives_the_reason(
-    open_port: Any,
+    port: Port,
     handlers: Handlers,
     warnings_of: Any,
     fields: dict[str, str],
@@ -223,7 +224,6 @@ def test_a_refused_connection_receives_the_reason(
     client: str,
 ) -> None:
     handlers.refusal = refusal
-    port = open_port()
     connection = port.connect(tcpros.header(fields))
     assert port.response(connection) == tcpros.header({"error": expected})
     assert warnings_of() == [f"refused a connection of {client}: {expected}"]
@@ -231,10 +231,9 @@ def test_a_refused_connection_receives_the_reason(
 
 
 def test_a_connection_whose_handler_fails_is_closed(
-    open_port: Any, handlers: Handlers, warnings_of: Any, monkeypatch: pytest.MonkeyPatch
+    port: Port, handlers: Handlers, warnings_of: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     handlers.refusal = RuntimeError("cause")
-    port = open_port()
     assert port.response(port.connect(tcpros.header(CLOCK))) == b""
     assert warnings_of() == ["a connection from 127.0.0.1 failed: cause"]
     monkeypatch.setattr(rospy.core, "is_shutdown_requested", lambda: True)
@@ -254,9 +253,8 @@ def test_a_connection_whose_handler_fails_is_closed(
     ],
 )
 def test_data_that_is_no_header_is_reported(
-    open_port: Any, warnings_of: Any, data: bytes, reason: str
+    port: Port, warnings_of: Any, data: bytes, reason: str
 ) -> None:
-    port = open_port()
     client = port.connect(data[:3])
     [handshake] = port.server._pending.values()
     client.sendall(data[3:])
@@ -268,8 +266,7 @@ def test_data_that_is_no_header_is_reported(
     assert port.server._pending == {}
 
 
-def test_a_header_of_the_largest_size_is_accepted(open_port: Any, handlers: Handlers) -> None:
-    port = open_port()
+def test_a_header_of_the_largest_size_is_accepted(port: Port, handlers: Handlers) -> None:
     fields = {**CLOCK, "text": ""}
     fields["text"] = "x" * (2**20 + 4 - len(tcpros.header(fields)))
     data = tcpros.header(fields)
@@ -280,10 +277,7 @@ def test_a_header_of_the_largest_size_is_accepted(open_port: Any, handlers: Hand
     port.serve_until(lambda: handlers.accepted)
 
 
-def test_a_client_that_ends_before_its_header_is_forgotten(
-    open_port: Any, warnings_of: Any
-) -> None:
-    port = open_port()
+def test_a_client_that_ends_before_its_header_is_forgotten(port: Port, warnings_of: Any) -> None:
     client = port.connect(b"\x08\0")
     [handshake] = port.server._pending.values()
     client.close()
@@ -292,11 +286,7 @@ def test_a_client_that_ends_before_its_header_is_forgotten(
     assert warnings_of() == []
 
 
-def test_the_oldest_of_too_many_incomplete_headers_is_closed(
-    open_port: Any, warnings_of: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(inbound, "MAX_CONNECTIONS", 2)
-    port = open_port()
+def test_the_oldest_of_too_many_incomplete_headers_is_closed(port: Port, warnings_of: Any) -> None:
     first, second = port.connect(b"a"), port.connect(b"b")
     oldest, _ = port.server._pending.values()
     third = port.connect(b"c")
@@ -309,9 +299,8 @@ def test_the_oldest_of_too_many_incomplete_headers_is_closed(
 
 
 def test_an_incomplete_header_has_a_time_limit(
-    open_port: Any, handlers: Handlers, pauses: list[float]
+    port: Port, handlers: Handlers, pauses: list[float]
 ) -> None:
-    port = open_port()
     slow = port.connect(b"a")
     pauses.append(inbound.HANDSHAKE_TIMEOUT)
     late = port.connect(b"b")
@@ -325,10 +314,8 @@ def test_an_incomplete_header_has_a_time_limit(
 
 
 def test_connections_beyond_the_limit_are_refused_until_others_end(
-    open_port: Any, handlers: Handlers, warnings_of: Any, monkeypatch: pytest.MonkeyPatch
+    port: Port, handlers: Handlers, warnings_of: Any
 ) -> None:
-    monkeypatch.setattr(inbound, "MAX_CLIENTS", 2)
-    port = open_port()
     for number in (1, 2):
         port.connect(tcpros.header(CLOCK))
         port.serve_until(lambda number=number: len(handlers.accepted) == number)
@@ -342,17 +329,13 @@ def test_connections_beyond_the_limit_are_refused_until_others_end(
 
 
 def test_exhausted_descriptors_end_the_oldest_connection(
-    open_port: Any, warnings_of: Any, pauses: list[float]
+    port: Port, warnings_of: Any, pauses: list[float]
 ) -> None:
-    port = open_port()
     client = port.connect(b"a")
     server_sock = port.server.server_sock
 
     def fail(number: int) -> None:
-        def accept() -> Any:
-            raise OSError(number, "cause")
-
-        port.server.server_sock = SimpleNamespace(accept=accept)
+        port.server.server_sock = _failing(number)
         port.server._accept()
         port.server.server_sock = server_sock
 
@@ -387,8 +370,7 @@ def test_the_thread_continues_after_an_unexpected_error(
     server.server_sock.close()
 
 
-def test_many_connections_can_wait_to_be_accepted(open_port: Any) -> None:
-    port = open_port()
+def test_many_connections_can_wait_to_be_accepted(port: Port) -> None:
     # Field tcpi_sacked of a listening socket is the number of connections that can wait.
     info = port.server.server_sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 32)
     assert struct.unpack_from("<I", info, 28)[0] > 100
@@ -473,11 +455,11 @@ def test_the_connection_without_a_request_for_the_longest_time_is_closed(rpc: Rp
 
 
 def test_a_connection_closed_during_its_request_does_not_count(rpc: Rpc) -> None:
-    first = rpc.connect()
+    first, second = rpc.connect(), rpc.connect()
     with rpc.server.handling(first[1]):
-        assert rpc.server._busy == {first[1]}
         rpc.server.close_request(first[1])
-        assert rpc.server._busy == set()
+        rpc.connect()
+        assert not _has_input(second[0])
 
 
 def test_exhausted_descriptors_end_an_idle_connection_of_xmlrpc(
@@ -487,10 +469,7 @@ def test_exhausted_descriptors_end_an_idle_connection_of_xmlrpc(
     listening = rpc.server.socket
 
     def fail(number: int) -> None:
-        def accept() -> Any:
-            raise OSError(number, "cause")
-
-        rpc.server.socket = SimpleNamespace(accept=accept)
+        rpc.server.socket = _failing(number)
         with pytest.raises(OSError, match="cause"):
             rpc.server.get_request()
         rpc.server.socket = listening

@@ -31,35 +31,6 @@ class Endpoint:
         self.ready = ready
 
 
-class Parameters:
-    """The parameters of a master.
-
-    Attributes:
-        error: Raised by each call, None for no error.
-    """
-
-    def __init__(self) -> None:
-        self.values: dict[str, object] = {}
-        self.error: Exception | None = None
-
-    def set(self, name: str, value: object) -> None:
-        if self.error is not None:
-            raise self.error
-        self.values[name] = value
-
-    def has(self, name: str) -> bool:
-        return name in self.values
-
-
-@pytest.fixture
-def parameters(monkeypatch: pytest.MonkeyPatch) -> Parameters:
-    parameters = Parameters()
-    monkeypatch.setattr(rospy, "set_param", parameters.set)
-    monkeypatch.setattr(rospy, "has_param", parameters.has)
-    monkeypatch.setattr(rospy, "resolve_name", lambda name: name.replace("~", "/node/"))
-    return parameters
-
-
 @pytest.fixture
 def registrar(monkeypatch: pytest.MonkeyPatch) -> Iterator[Registrar]:
     monkeypatch.setattr(rospy.core, "is_shutdown_requested", lambda: False)
@@ -234,23 +205,29 @@ def test_a_topic_is_connected_if_all_its_endpoints_are_ready(registrar: Registra
 
 
 def test_a_parameter_is_set_in_order_and_again_on_a_new_master(
-    registrar: Registrar, parameters: Parameters, caplog: pytest.LogCaptureFixture
+    registrar: Registrar, master: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
+    rate, seed = map(rospy.resolve_name, ("~rate", "~seed"))
+
+    def restored(**found: object) -> dict[str, object]:
+        """Returns the parameters of a new master, on which someone has set others before."""
+        master.start()
+        rospy.set_param(rospy.get_name(), found)
+        registrar.restore_parameters()
+        return {name: rospy.get_param(name) for name in (rate, seed, "/use_sim_time")}
+
     registrar.set_parameter("~rate", 50.0)
     assert registrar.flush(TIMEOUT)
-    assert parameters.values == {"/node/rate": 50.0}
-    registrar.keep_parameters({"/node/rate": 10.0, "/node/seed": 1, "/use_sim_time": True})
-    parameters.values = {"/node/seed": 2, "/node/rate": 20.0}
-    registrar.restore_parameters()
-    assert parameters.values == {"/node/rate": 50.0, "/node/seed": 2, "/use_sim_time": True}
+    assert rospy.get_param("~rate") == 50.0
+    registrar.keep_parameters({rate: 10.0, seed: 1, "/use_sim_time": True})
+    master.stop()
+    assert restored(seed=2, rate=20.0) == {rate: 50.0, seed: 2, "/use_sim_time": True}
     # Without a master, the last value is that of the next master.
-    parameters.error = ConnectionRefusedError()
+    master.stop()
     registrar.set_parameter("~rate", 60.0)
     assert registrar.flush(TIMEOUT)
     assert caplog.records == []
-    parameters.error, parameters.values = None, {}
-    registrar.restore_parameters()
-    assert parameters.values == {"/node/rate": 60.0, "/node/seed": 1, "/use_sim_time": True}
+    assert restored() == {rate: 60.0, seed: 1, "/use_sim_time": True}
 
 
 # -- topics of rospy -------------------------------------------------------------------------------
