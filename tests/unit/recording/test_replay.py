@@ -295,9 +295,10 @@ def test_a_full_disk_during_the_run_ends_the_recording_only(
     full = os.open("/dev/full", os.O_WRONLY)
     os.dup2(full, recorder._writer._file)
     os.close(full)
+    caplog.clear()
     with caplog.at_level(logging.ERROR, logger="flatland"):
         world.step(450)
-    assert [record.getMessage() for record in caplog.records] == [
+    assert caplog.messages == [
         f'Flatland recording: cannot write "{path}": '
         "No space left on device; the recording ends at step 200"
     ]

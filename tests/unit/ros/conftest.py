@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from threading import Thread
 from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
+from free_ports import free_port
 
 
 class RosMaster:
@@ -17,16 +19,15 @@ class RosMaster:
     """
 
     def __init__(self) -> None:
-        self._address = ("127.0.0.1", 0)
-        self.start()
+        self._address = ("127.0.0.1", free_port())
         self.uri = "http://{}:{}".format(*self._address)
+        self.start()
 
     def start(self) -> None:
         """Starts a master without registrations and parameters."""
         from rosmaster.master_api import ROSMasterHandler
 
         self._server = SimpleXMLRPCServer(self._address, logRequests=False)
-        self._address = self._server.server_address  # type: ignore[assignment]
         self._server.register_instance(ROSMasterHandler(1))
         self._server.register_multicall_functions()
         Thread(target=self._server.serve_forever, args=(0.01,), daemon=True).start()
@@ -43,6 +44,8 @@ def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[RosMaster]:
     client = pytest.importorskip("rospy.client", reason="ROS is not installed")
     master = RosMaster()
     monkeypatch.setenv("ROS_MASTER_URI", master.uri)
+    # Its messages would be among those that a test compares.
+    monkeypatch.setattr(logging.getLogger("rosmaster.master"), "disabled", True)
     for name in ("_master_proxy", "_param_server"):  # of another master
         monkeypatch.setattr(client, name, None)
     yield master

@@ -270,7 +270,7 @@ def test_an_invalid_parameter_ends_the_program(
     rospy.set_param("~rate", 0.0)
     assert node.main() == 1
     assert ros[-1] == ("shutdown", "invalid parameter")
-    [record] = caplog.records
+    [record] = (record for record in caplog.records if record.name == "flatland")
     assert record.levelname == "CRITICAL"
     assert record.getMessage().startswith('Invalid parameter "~rate": ')
 
