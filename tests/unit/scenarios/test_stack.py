@@ -258,7 +258,8 @@ def test_a_stack_that_is_not_ready_in_time_is_a_failed_run(drive):
 def test_real_time_that_is_not_held_makes_a_run_invalid(drive, room, monkeypatch):
     (row,) = drive("drive", pace="real-time")
     if row["outcome"] == "invalid":  # on a machine that is too busy
-        assert float(re.search(r"hold real time: ([\d.]+) s", row["failures"])[1]) < 0.95
+        # The text is rounded.
+        assert float(re.search(r"hold real time: ([\d.]+) s", row["failures"])[1]) <= 0.95
     else:
         assert (row["outcome"], row["passed"]) == ("reached", True), row["error"]
     assert row["real_time_factor"] < 1.1
