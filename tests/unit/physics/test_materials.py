@@ -173,6 +173,19 @@ def test_a_mirror_shows_objects_at_the_distance_of_their_image() -> None:
     assert scan.hits[scan.labels[0] - 1][0] == target.id
 
 
+@pytest.mark.parametrize("turn", [0.0, math.pi / 2])
+def test_a_mirror_shows_the_end_of_a_group_of_edges_that_begins_far_behind_it(turn: float) -> None:
+    world = PhysicsWorld()
+    sensor = world.create_body("static", (0, 0, turn))
+    world.create_body("static", (0, 0, turn)).create_edges(
+        [[2, -0.5, 2, 0.5], [-18, 5, -18, 6]], category_bits=1
+    )
+    mirror = world.create_body("static", (0, 0, turn))
+    mirror.create_edges([[-1, -1, -1, 1]], category_bits=1)
+    mirror.set_material(MIRROR)
+    assert finder([math.pi]).scan(sensor, 1, 1).ranges == pytest.approx([1 + 3])
+
+
 def test_a_beam_is_reflected_only_once() -> None:
     world, sensor = room()
     add_edge(world, [3, -8, 3, 8], MIRROR)
@@ -317,6 +330,17 @@ def test_the_reflectance_layer_keeps_its_intensity() -> None:
     is_plain = np.abs(8 * np.tan(FRONT)) > 1.01
     assert (after.intensities[is_plain] < 2).all()
     assert (after.intensities[is_plain] > 0).all()
+
+
+def test_the_reflectance_layer_has_full_intensity_in_a_mirror() -> None:
+    world, sensor = room()
+    add_edge(world, [-1, -1, -1, 1], MIRROR)
+    add_edge(world, [3, 0, 3, 2], None, bits=2)
+    angles = [math.pi - 0.1, math.pi + 0.1]  # the wall and the room, 4 and 9 m from the mirror
+    scan = finder(angles, reflect_mask=2, mask=3).scan(sensor, 1, 1)
+    assert scan.ranges * math.cos(0.1) == pytest.approx([5, 10], abs=1e-4)
+    assert scan.intensities[0] == 255
+    assert 0 < scan.intensities[1] < 2
 
 
 # -- what beams hit ---------------------------------------------------------------------------

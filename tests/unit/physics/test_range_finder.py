@@ -250,6 +250,29 @@ class TestManyScans:
         other.step(0.01, 1, 1)  # is not locked
 
 
+@pytest.mark.parametrize("shape", ["edge", "box"])
+def test_each_beam_can_be_the_only_one_that_passes_a_gap(shape: str) -> None:
+    beams = 64
+    world = PhysicsWorld()
+    sensor = world.create_body("kinematic", (0, 0, 0))
+    # A ring of edges that is open to one beam, and behind it a target, wide enough for several.
+    corners = np.array([(x / LENGTH, y / LENGTH) for x, y in fan(60, 0.06, 2 * math.pi - 0.06)])
+    world.create_body("static", (0, 0, 0)).create_edges(
+        np.hstack([corners[:-1], corners[1:]]), category_bits=1
+    )
+    target = world.create_body("static", (5, 0, 0))
+    if shape == "edge":
+        target.create_edges([[0, -2, 0, 2]], category_bits=1)
+    else:
+        target.create_polygon([(0, -2), (1, -2), (1, 2), (0, 2)], density=0)
+    scanner = finder(fan(beams + 1)[:-1], origin=(0, 0, 0))
+    for beam in range(beams):
+        sensor.set_pose(0, 0, math.pi - 2 * math.pi * beam / beams)
+        ranges = scanner.scan(sensor, 1, 1).ranges
+        assert ranges[beam] == pytest.approx(5.0, abs=1e-4)
+        assert np.delete(ranges, beam).max() < 1.01
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
