@@ -12,6 +12,7 @@ from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_sensor_data
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from waiting import wait_until
 
@@ -25,10 +26,12 @@ def fatal_lines(program: Any) -> list[str]:
     return [line for line in program.lines if "[FATAL]" in line]
 
 
-def test_a_signal_ends_the_node_with_code_0(ros: Any, launcher: Any, world: Path) -> None:
-    """SIGINT ends those of other tests."""
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_node_with_code_0(
+    ros: Any, launcher: Any, world: Path, number: signal.Signals
+) -> None:
     program = launcher.server(ros, world)
-    program.send(signal.SIGTERM)
+    program.send(number)
     assert program.wait() == 0
     assert fatal_lines(program) == []
     assert "Traceback" not in program.output
@@ -37,8 +40,11 @@ def test_a_signal_ends_the_node_with_code_0(ros: Any, launcher: Any, world: Path
 @pytest.mark.parametrize(
     ("parameters", "texts"),
     [
+        ({"world_path": "/no/such/world.yaml"}, ["/no/such/world.yaml"]),
         ({"world_path": "{folder}/bad.model.yaml"}, ["bad.model.yaml"]),
         ({"update_rate": "fast"}, ['Invalid parameter "~update_rate"', "'fast'"]),
+        ({"step_size": "-1"}, ['Invalid parameter "~step_size"', "-1"]),
+        ({"publish_map": "roof"}, ['Invalid parameter "~publish_map"', "2d"]),
     ],
 )
 def test_a_failed_start_is_reported_in_one_line(
@@ -95,3 +101,12 @@ def test_two_nodes_in_namespaces_with_remapped_topics(ros: Any, launcher: Any, w
     wait_until("/clock of both nodes", is_published_by_both)
     topics = dict(ros.node.get_topic_names_and_types())
     assert not {"/first/scan", "/second/scan", "/scan", "/first/clock"} & topics.keys()
+
+
+def test_time_of_a_client_with_use_sim_time(ros: Any, launcher: Any, world: Path) -> None:
+    launcher.server(ros, world, lockstep=True)
+    clock = ros.topic("/clock", Clock, qos_profile_sensor_data)
+    ros.wait_until_ready("/clock")
+    now = ros.step(1.0)
+    clock.until(lambda message: message.clock.sec * 10**9 + message.clock.nanosec == now)
+    assert now == 10**9

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 import topic_table
-from geometry_msgs.msg import TwistStamped
+from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import LaserScan
@@ -86,12 +86,23 @@ def test_late_subscribers_receive_the_map_and_the_frames_of_sensors(ros: Any) ->
         ros.close()
 
 
-def test_stamped_velocity_commands(ros: Any, launcher: Any, world: Path) -> None:
-    launcher.server(ros, world, "-r", "__ns:=/driven", enable_stamped_cmd_vel=True)
+def test_sensors_are_reliable_on_request(ros: Any, launcher: Any, world: Path) -> None:
+    launcher.server(ros, world, "-r", "__ns:=/reliable", reliable_sensors=True)
+    # As the clients of the ports of the reference to ROS 2.
+    assert len(ros.topic("/reliable/scan", LaserScan, 1).next().ranges) == 7
+
+
+@pytest.mark.parametrize(
+    ("stamped", "command_type"), [(False, Twist), (True, TwistStamped)], ids=["Twist", "stamped"]
+)
+def test_velocity_commands(
+    ros: Any, launcher: Any, world: Path, stamped: bool, command_type: type[Any]
+) -> None:
+    launcher.server(ros, world, "-r", "__ns:=/driven", enable_stamped_cmd_vel=stamped)
     odometry = ros.topic("/driven/odometry/filtered", Odometry)
-    publisher = ros.publisher("/driven/cmd_vel", TwistStamped)
-    command = TwistStamped()
-    command.twist.linear.x = 0.25
+    publisher = ros.publisher("/driven/cmd_vel", command_type)
+    command = command_type()
+    (command.twist if stamped else command).linear.x = 0.25
     publisher.publish(command)
     odometry.until(lambda message: message.twist.twist.linear.x == pytest.approx(0.25))
 
