@@ -151,14 +151,16 @@ def _crash_if_blank(panel: RvizPanel) -> None:
     from PyQt5.QtCore import QTimer
 
     timer = QTimer(panel.widget)
-    # RViz draws several frames between two checks, however slow the machine is.
-    checks = iter(range(_BLANK_CHECKS))
+    blank = 0  # checks; RViz draws several frames between two of them, however slow the machine is
 
     def check() -> None:
+        nonlocal blank
         has_picture = panel.has_picture()
         if has_picture:
             timer.stop()
-        elif has_picture is not None and next(checks, None) is None:
+        elif has_picture is not None:
+            blank += 1
+        if blank == _BLANK_CHECKS:
             _LOG.error("RViz draws nothing")
             os.abort()
 
