@@ -18,7 +18,7 @@ from flatland.plugin_api.odometry_drift import (
     OdometryDrift,
 )
 
-SEEDS = 1000
+SEEDS = 2000
 START = (1.0, -2.0, 0.7)
 LEVER = (-1.0, 0.2)
 
@@ -64,8 +64,8 @@ def check_covariance(samples: npt.NDArray[np.float64], expected: npt.NDArray[np.
     """Compares a sample covariance, each entry relative to the standard deviations."""
     scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     scale[scale == 0.0] = 1.0
-    # The standard error of a variance is sqrt(2 / SEEDS) = 4.5 %.
-    assert np.abs((np.cov(samples.T) - expected) / scale).max() < 0.15
+    # The standard error of a variance is sqrt(2 / SEEDS) = 3 %.
+    assert np.abs((np.cov(samples.T) - expected) / scale).max() < 0.12
 
 
 class TestMoments:
@@ -93,7 +93,7 @@ class TestMoments:
         expected[:2, :2] = a4 * moves @ moves.T
         expected[2, 2] = n * a1 * SEGMENT_ANGLE**2
         check_covariance(samples, expected)
-        assert samples.mean(axis=0) == pytest.approx((0.0, 0.0, side * math.pi), abs=0.02)
+        assert samples.mean(axis=0) == pytest.approx((0.0, 0.0, side * math.pi), abs=0.01)
 
     def test_reported_covariance_on_an_arc(self) -> None:
         parameters = (0.005, 0.002, 0.005, 0.002)
@@ -154,8 +154,8 @@ class TestEstimate:
     def test_tiny_motions_accumulate(self) -> None:
         start = (0.0, 0.0, 0.0)
         estimator = drift((0.0, 0.0, 0.05, 0.0), start=start)
-        for k in range(1, 5001):
-            estimator.advance((k * 2e-4, 0.0, 0.0))
+        for k in range(1, 20_001):
+            estimator.advance((k * 5e-5, 0.0, 0.0))
         coarse = follow(drift((0.0, 0.0, 0.05, 0.0), start=start), arc(1.0, 0.0, 1.0, 50, start))
         assert estimator.pose == pytest.approx(coarse.pose, abs=0.01)
         assert abs(estimator.pose[0] - 1.0) > 0.01
@@ -209,7 +209,7 @@ class TestVelocity:
     def test_covariance(self) -> None:
         velocity = (0.6, 0.5 * 1.0, 0.5)
         samples = np.array(
-            [drift(self.PARAMETERS, k, center=LEVER).measure(velocity) for k in range(1, SEEDS + 1)]
+            [drift(self.PARAMETERS, k, center=LEVER).measure(velocity) for k in range(1, 2001)]
         )
         found = drift(self.PARAMETERS, center=LEVER).twist_covariance(velocity)
         check_covariance(samples, found[np.ix_((0, 1, 5), (0, 1, 5))])
