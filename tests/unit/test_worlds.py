@@ -172,11 +172,11 @@ def test_each_frame_has_one_parent(office: flatland.World) -> None:
 
 
 def odometry_error(world: flatland.World) -> float:
-    """Returns the distance between odometry and true position after 5 m [m]."""
+    """Returns the distance between odometry and true position after 10 m [m]."""
     odometry, truth = world.output("/odometry/filtered"), world.output("/odometry/ground_truth")
     world.command("/cmd_vel").set(flatland.Twist(linear_x=0.5))
-    world.step(2000)
-    assert truth.latest.pose[0] > 1.5
+    world.step(4000)
+    assert truth.latest.pose[0] > 6.5
     return math.dist(odometry.latest.pose[:2], truth.latest.pose[:2])
 
 
@@ -186,7 +186,7 @@ def test_a_localization_can_send_the_transform_to_map_and_correct_the_drift(
     assert odometry_error(office) == 0.0
     path = str(worlds / "office/world.yaml")
     with flatland.World.from_yaml(path, seed=1, params={"/map_to_odom": False}) as world:
-        assert 0.005 < odometry_error(world) < 1.0
+        assert 0.01 < odometry_error(world) < 1.0
         assert ("map", "odom") not in world.transforms
         assert ("odom", "base_link") in world.transforms
 
