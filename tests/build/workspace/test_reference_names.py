@@ -106,6 +106,7 @@ def test_cpp_client_of_the_reference(space, room):
         assert launch.stop() == 0, launch.output
     finally:
         launch.kill()
+        print(launch.output)  # Part of the report if the client fails.
     # The lines of rosconsole start with the code of a colour.
     printed = [line for line in done.stdout.splitlines() if not line.startswith("\x1b")]
     assert printed == RESULTS, done.stdout + done.stderr + launch.output
