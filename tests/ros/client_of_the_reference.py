@@ -23,31 +23,38 @@ from geometry_msgs.msg import Pose2D
 TIMEOUT = 60.0  # s, for each result
 _changed = threading.Condition()
 _latest = {}
+_collided = False
 
 
 def listen(topic, message_type):
-    """Keeps the latest message of a topic."""
+    """Keeps the latest message of a topic, and whether there was a collision."""
 
     def keep(message):
+        global _collided
         with _changed:
             _latest[message_type] = message
+            # The contact has points until the body sleeps, half a second later.
+            _collided = _collided or (message_type is Collisions and is_collision(message))
             _changed.notify_all()
 
     rospy.Subscriber(topic, message_type, keep)
 
 
-def expect(result, message_type, condition):
-    """Waits for a message."""
+def report(result, condition):
+    """Waits for a condition."""
     with _changed:
-        met = _changed.wait_for(
-            lambda: message_type in _latest and condition(_latest[message_type]), TIMEOUT
-        )
+        met = _changed.wait_for(condition, TIMEOUT)
     print(result if met else f"missing: {result}", flush=True)
 
 
+def expect(result, message_type, condition):
+    """Waits for a message."""
+    report(result, lambda: message_type in _latest and condition(_latest[message_type]))
+
+
 def is_collision(message):
-    """Returns whether the crate touches the wall."""
-    if not message.collisions:
+    """Returns whether the crate touches the wall, with points of the contact."""
+    if not message.collisions or not message.collisions[0].contact_positions:
         return False
     collision = message.collisions[0]
     assert isinstance(collision, Collision)
@@ -69,12 +76,13 @@ def main():
     request = SpawnModelRequest()
     request.yaml_path = sys.argv[1]
     request.name = request.ns = "crate"
-    request.pose = Pose2D(5.0, 0.0, 0.0)
     response = spawn(request)
     print("spawned" if response.success else response.message, flush=True)
     expect("listed", DebugTopicList, lambda message: "model/crate" in message.topics)
-    expect("collides with a wall", Collisions, is_collision)
+    expect("publishes", Collisions, lambda message: not message.collisions)
     move = rospy.ServiceProxy("move_model", MoveModel)
+    assert move(MoveModelRequest(name="crate", pose=Pose2D(5.0, 0.0, 0.0))).success
+    report("collides with the wall", lambda: _collided)
     assert move(MoveModelRequest(name="crate", pose=Pose2D(0.0, 0.0, 0.0))).success
     expect("is free", Collisions, lambda message: not message.collisions)
     delete = rospy.ServiceProxy("delete_model", DeleteModel)

@@ -93,7 +93,8 @@ def test_clients_of_the_other_package(package: str, launcher: Any, world: Path) 
         )
         assert client.wait() == 0, client.output
         assert client.lines == [
-            *("spawned", "listed", "collides with a wall", "is free", "no longer listed")
+            *("spawned", "listed", "publishes"),
+            *("collides with the wall", "is free", "no longer listed"),
         ]
     else:
         client = launcher.program("rosservice", "call", "/move_model", "{name: nobody}")

@@ -27,8 +27,9 @@ plugins:
 """
 RESULTS = [
     "an absent model file is refused",
-    *("spawned", "listed", "collides with a wall", "moved", "is free", "deleted"),
-    "no longer listed",
+    *("spawned", "listed", "publishes"),
+    *("moved to a wall", "collides with the wall", "moved back", "is free"),
+    *("deleted", "no longer listed"),
 ]
 
 
