@@ -14,9 +14,10 @@ from typing import Any
 import pytest
 from geometry_msgs.msg import PointStamped
 from raw_subscriber import RawSubscriber
-from std_msgs.msg import Int32
+from std_msgs.msg import Int32, String
 from waiting import TIMEOUT, wait_until
 
+from flatland.ros.transport.outbox import open_outboxes
 from flatland.ros.transport.publisher import Publisher
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.ros_transport import RosTransport
@@ -115,6 +116,24 @@ def test_a_broken_connection_is_closed_and_the_others_receive_the_message(advert
     assert publisher._publisher.impl.connections == [second]
     assert [subscribers[1].next().data for _ in range(2)] == [7, 8]
     assert subscribers[0].socket.recv(1) == b""
+
+
+def test_by_default_only_the_newest_message_waits_for_a_slow_subscriber(
+    registrar: Registrar, ros: Any
+) -> None:
+    publisher = Publisher(registrar, PLAIN, String)
+    assert registrar.flush(TIMEOUT)
+    subscriber = RawSubscriber(ros.master, PLAIN, String)
+    wait_until("the connection", lambda: publisher.connected)
+    outbox = next(outbox for outbox in open_outboxes() if outbox.topic == PLAIN)
+    count = 0
+    while outbox.dropped < 3:
+        publisher.publish(String(data=f"{count:09d}".ljust(100_000)))
+        count += 1
+    received = [int(subscriber.next().data) for _ in range(count - 3)]
+    subscriber.close()
+    publisher.close()
+    assert received == [*range(count - 4), count - 1]
 
 
 def test_a_topic_is_ready_after_its_owner_was_notified(registrar: Registrar, ros: Any) -> None:
