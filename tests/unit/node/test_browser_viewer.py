@@ -205,7 +205,6 @@ def test_the_viewer_ends_with_the_node(
 ) -> None:
     node = serve(web=True, web_port=0)
     url = url_of_the_page(caplog)
-    node.served.close()
     node.close()
     with pytest.raises(OSError, match="Cannot connect"):
         WebClient(url)

@@ -157,8 +157,7 @@ def test_the_end_stops_all_threads(serve: Callable[..., Any]) -> None:
     for thread in threading.enumerate():
         if thread.name == "flatland-deferred-topics":
             thread.join(TIMEOUT)
-    node.served.simulation.stop()
-    node.served.close()
+    node.close()
     for thread in set(threading.enumerate()) - before:
         thread.join(TIMEOUT)
         assert not thread.is_alive(), thread
