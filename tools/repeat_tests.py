@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import signal
 import subprocess
 import sys
 import time
@@ -86,6 +87,8 @@ def main() -> int:
     parser.add_argument("--load", type=int, default=0, help="number of busy processes beside them")
     options, arguments = parser.parse_known_args()
     FOLDER.mkdir(parents=True, exist_ok=True)
+    # The end of make ends the busy processes as well.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     failures: dict[str, list[str]] = defaultdict(list)
     unsuccessful = 0
     with busy_processes(options.load):

@@ -136,6 +136,21 @@ def test_by_default_only_the_newest_message_waits_for_a_slow_subscriber(
     assert received == [*range(count - 4), count - 1]
 
 
+def test_a_topic_that_is_closed_and_opened_again_keeps_its_connections(
+    advertise: Any, registrar: Registrar
+) -> None:
+    publisher, subscribers = advertise(PLAIN, Int32)
+    connections = publisher._publisher.impl.connections
+    with registrar.closing_last():
+        publisher.close()
+        again = Publisher(registrar, PLAIN, Int32)
+    assert registrar.flush(TIMEOUT)
+    assert again._publisher.impl.connections == connections
+    again.publish(Int32(5))
+    assert [subscriber.next().data for subscriber in subscribers] == [5, 5]
+    again.close()
+
+
 def test_a_topic_is_ready_after_its_owner_was_notified(registrar: Registrar, ros: Any) -> None:
     polled, ready = threading.Event(), threading.Event()
     early: list[bool] = []

@@ -394,6 +394,7 @@ class TestMarkers:
     def test_the_number_of_markers_is_limited(self, frames, monkeypatch):
         monkeypatch.setattr("flatland.node.foreign_topics.markers.MAX_MARKERS", 20)
         drawer = MarkerDrawer()
+        assert drawer.note == ""
         shared = [marker(Marker.SPHERE, number) for number in range(25)]
         drawer.receive(MarkerArray(markers=shared), 0)
         assert len(drawer.draw(frames, 0, again=False).lines) == 20
@@ -415,6 +416,11 @@ class TestTrees:
         assert len(tree["markers"]) == 17
         assert str(tree).count("'…'") > 0
         assert str(tree).count(": ") < 3 * MAX_VALUES
+
+    def test_values_beyond_the_limit_are_omitted(self):
+        values = [[[0] * 10] * 10] * (MAX_VALUES // 100)
+        assert tree_of(values) == values
+        assert tree_of([*values, [1, 2]]) == [*values, ["…", "…"]]
 
     def test_numbers_that_are_not_finite_are_texts(self):
         assert tree_of(Point(math.nan, math.inf, 1)) == {"x": "nan", "y": "inf", "z": 1}
