@@ -63,6 +63,18 @@ def test_a_new_controller_acts_although_another_job_is_removed(
     assert body.velocity == (1.0, 0.0, 0.0)
 
 
+def test_a_controller_that_fails_keeps_the_velocity_of_the_step_before(world: PhysicsWorld) -> None:
+    body = world.create_body("kinematic", (0, 0, 0))
+    controller = body.control_velocity()
+    controller.set_target(1.0, 0.0, 0.5)
+    run(world)
+    controller.set_target(1e30, 0.0, 0.0)
+    [(failed, text)] = world.jobs.run(*Run(STEP, STEP, 1, 0.01, 8, 3))[3]
+    assert failed == controller.id
+    assert text.startswith("velocity must be finite and within +-1e+09, got (9.99")
+    assert controller.velocity == body.velocity == (1.0, 0.0, 0.5)
+
+
 def test_a_new_clock_does_not_replace_one_in_use(world: PhysicsWorld) -> None:
     first = world.jobs.add_callback((1, 0), ALWAYS, is_after=False)
     removed = world.jobs.add_callback((2, 0), NEVER, is_after=False)
