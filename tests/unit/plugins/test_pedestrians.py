@@ -77,6 +77,34 @@ def test_people_in_a_crowd_touch_neither_walls_nor_each_other(
     assert moved > 24 * 3.0
 
 
+@pytest.mark.parametrize(
+    ("model", "documented"),
+    [
+        (
+            "social_force",
+            "relaxation_time: 0.5, strength: 1.5, range: 0.3, look_ahead: 1, relative: 1, "
+            "behind: 0.1, wall_strength: 5, wall_range: 0.1, gaze: 4, cohesion: 3, spacing: 1",
+        ),
+        ("orca", "horizon: 2, wall_horizon: 0.5"),
+    ],
+)
+def test_the_default_parameters_are_those_of_the_documentation(
+    files: WorldFiles, model: str, documented: str
+) -> None:
+    groups = (
+        "[{name: a, count: 12, together: 3, waypoints: [{at: [2, 2]}, {at: [8.5, 4.5]}],"
+        " order: back_and_forth}]"
+    )
+    worlds = [
+        load(files, groups, f"model: {model}, {options}")
+        for options in ("", f"{model}: {{{documented}}}, ")
+    ]
+    for world in worlds:
+        world.step(2000)
+    default, explicit = (people_of(world).people.poses for world in worlds)
+    assert default.tolist() == explicit.tolist()
+
+
 @pytest.mark.parametrize("model", ["social_force", "orca"])
 def test_opposite_streams_pass_a_door(files: WorldFiles, model: str) -> None:
     walls = [
