@@ -27,18 +27,26 @@ RVIZ_PANEL = {"x": 366, "y": 64, "width": 816, "height": 636}
 
 # A viewer whose view is black at the first start: without grid, on a black background.
 BLACK_AT_FIRST = """
+import os
 import sys
 from pathlib import Path
 from flatland.viewer import app, rviz_panel, window
 
+aborted, abort = Path(sys.argv[1]), os.abort
+
 class Panel(rviz_panel.RvizPanel):
     def __init__(self):
-        if not (started := Path(sys.argv[1])).exists():
-            started.touch()
+        # RViz may also crash by itself, and start again.
+        if not aborted.exists():
             for text, other in ("48; 48; 48", "0; 0; 0"), ("Alpha: 0.12", "Alpha: 0"):
                 rviz_panel._CONFIG = rviz_panel._CONFIG.replace(text, other)
         super().__init__()
 
+def abort_once():
+    aborted.touch()
+    abort()
+
+os.abort = abort_once
 window.RvizPanel = Panel
 sys.exit(app.main())
 """
@@ -185,7 +193,7 @@ def test_viewer_starts_again_if_rviz_draws_nothing(
     on_screen: Any, ros: Any, screen: Any, tmp_path: Path, eventually: Callable[..., Any]
 ) -> None:
     del ros
-    viewer = on_screen.program(sys.executable, "-c", BLACK_AT_FIRST, str(tmp_path / "started"))
+    viewer = on_screen.program(sys.executable, "-c", BLACK_AT_FIRST, str(tmp_path / "aborted"))
     viewer.wait_for_line("RViz draws nothing")
     viewer.wait_for_line(r"RViz or OpenGL has crashed \(SIGABRT\); the viewer starts again")
     eventually("grey view", lambda: (screen.picture() == 48).all(axis=2).mean() > 0.5)

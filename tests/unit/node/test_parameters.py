@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import itertools
 import math
@@ -141,7 +142,7 @@ def test_invalid_numbers() -> None:
         assert f"got {float(value) if value in (-1, -1e-300) else value!r}" in error
 
 
-INVALID: dict[str, list[object]] = {
+INVALID: dict[str, list[Any]] = {
     "max_lag": [math.inf, "inf"],
     "step_size": [0, math.inf, 1e-10, 0.9e-6, 1001, 10**400],
     "viz_pub_rate": [0],
@@ -185,7 +186,12 @@ INVALID: dict[str, list[object]] = {
 def test_invalid_values() -> None:
     for name, values in INVALID.items():
         for value in values:
-            assert error_of(name, value).startswith("it must be "), (name, value)
+            error = error_of(name, value)
+            assert error.startswith("it must be "), (name, value)
+            shown = {repr(value)}
+            with contextlib.suppress(TypeError, ValueError, OverflowError):
+                shown.add(repr(float(value)))
+            assert error.rpartition(", got ")[2] in shown, (name, error)
 
 
 def test_the_choices_are_named() -> None:
