@@ -24,6 +24,7 @@ from flatland.ros.transport.ros_transport import RosTransport
 
 STAMPED = "/flatland_tests/stamped"
 PLAIN = "/flatland_tests/plain"
+TEXT = "/flatland_tests/text"
 
 
 def serialized(message: Any) -> bytes:
@@ -121,11 +122,11 @@ def test_a_broken_connection_is_closed_and_the_others_receive_the_message(advert
 def test_by_default_only_the_newest_message_waits_for_a_slow_subscriber(
     registrar: Registrar, ros: Any
 ) -> None:
-    publisher = Publisher(registrar, PLAIN, String)
+    publisher = Publisher(registrar, TEXT, String)
     assert registrar.flush(TIMEOUT)
-    subscriber = RawSubscriber(ros.master, PLAIN, String)
+    subscriber = RawSubscriber(ros.master, TEXT, String)
     wait_until("the connection", lambda: publisher.connected)
-    outbox = next(outbox for outbox in open_outboxes() if outbox.topic == PLAIN)
+    outbox = next(outbox for outbox in open_outboxes() if outbox.topic == TEXT)
     count = 0
     while outbox.dropped < 3:
         publisher.publish(String(data=f"{count:09d}".ljust(100_000)))
