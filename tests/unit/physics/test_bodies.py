@@ -326,6 +326,17 @@ def test_shapes_are_scaled_about_the_origin(world: PhysicsWorld) -> None:
         wall.scale_shapes(2.0)
 
 
+def test_the_mass_of_scaled_shapes_is_limited(world: PhysicsWorld) -> None:
+    body = world.create_body("dynamic", (0, 0, 0))
+    body.create_circle((0, 0), 30.0, density=1e9 / math.pi)
+    assert body.inertia == pytest.approx(4.05e14)  # kg m²
+    with pytest.raises(ValueError, match=r"mass of the body is too large for a factor of 1\.26"):
+        body.scale_shapes(1.26)  # to 1.02e15 kg m²
+    assert body.fixtures[0].radius == 30.0
+    body.scale_shapes(1.2)
+    assert body.fixtures[0].radius == pytest.approx(36.0)
+
+
 def test_motions_of_several_bodies_are_read_in_one_call(world: PhysicsWorld) -> None:
     bodies = [world.create_body("dynamic", (1.5 * i, -i, 0.25 * i)) for i in range(3)]
     for i, body in enumerate(bodies):

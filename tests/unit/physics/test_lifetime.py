@@ -10,7 +10,7 @@ from collections.abc import Callable
 import pytest
 
 from flatland.errors import StaleHandleError
-from flatland.physics import PhysicsBody, PhysicsFixture, PhysicsJoint, PhysicsWorld
+from flatland.physics import PhysicsBody, PhysicsFixture, PhysicsJoint, PhysicsWorld, Touches
 
 BODY_USES: list[Callable[[PhysicsBody], object]] = [
     lambda b: b.pose,
@@ -134,6 +134,18 @@ def test_ids_are_not_reused(world: PhysicsWorld) -> None:
         assert not any(handle.alive for handle in seen[:-2])
         body.destroy()
     assert len({handle.id for handle in seen}) == len(seen)
+
+
+def test_handles_remain_stale_after_the_world_was_cleared(world: PhysicsWorld) -> None:
+    def make_all() -> list[PhysicsBody | PhysicsFixture | PhysicsJoint | Touches]:
+        pair = make_pair(world)
+        return [*pair, world.collect_touches(pair[:1])]
+
+    before = make_all()
+    world.clear()
+    after = make_all()
+    assert [handle.alive for handle in after] == [True] * 5
+    assert not any(handle.alive for handle in before)
 
 
 def test_the_id_of_an_object_of_another_kind_is_invalid(world: PhysicsWorld) -> None:
