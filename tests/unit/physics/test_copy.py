@@ -234,6 +234,9 @@ def test_each_fixture_is_reverted_to_its_own_values(world: PhysicsWorld) -> None
         body.scale_shapes(3.0)
         world.become_copy_of(source)
         assert values() == before
+        body.create_circle((3.0, 0.0), 0.1, density=1.0)
+        world.become_copy_of(source)
+        assert values() == before
 
 
 @PROPERTY
