@@ -79,6 +79,20 @@ def test_a_path_goes_on_from_a_place() -> None:
     assert body.pose == pytest.approx((1.75, 0, 0), abs=1e-5)
 
 
+def test_rounding_errors_do_not_accumulate_on_a_path() -> None:
+    body = PhysicsWorld().create_body("kinematic", (0, 0, 0))
+    controller = body.control_path(
+        [(30, 40, 1)], mode="loop", faces_forward=False, linear=SPEED, angular=SPIN, wait=0.0, key=7
+    )
+    controller.set_start(True, 1)
+    steps = 9000
+    for _ in range(steps):
+        body.world.jobs.run(0, 10_000_000, 1, 0.01, 8, 3)
+    share = 0.01 * steps * SPEED[0] / 50
+    # To the precision of 32 bits.
+    assert body.pose == pytest.approx((30 * share, 40 * share, share), rel=1e-7)
+
+
 @pytest.mark.parametrize(("mode", "is_started"), [("once", True), ("loop", False)])
 def test_a_path_that_does_not_run_has_no_places(mode: str, is_started: bool) -> None:
     body, controller = path(mode)
