@@ -87,7 +87,7 @@ def main() -> int:
     parser.add_argument("--load", type=int, default=0, help="number of busy processes beside them")
     options, arguments = parser.parse_known_args()
     FOLDER.mkdir(parents=True, exist_ok=True)
-    # The end of make ends the busy processes as well.
+    # As SIGINT does, so that the busy processes end with this one.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     failures: dict[str, list[str]] = defaultdict(list)
     unsuccessful = 0

@@ -16,5 +16,5 @@ def registrar(ros: Any) -> Iterator[Registrar]:
     """A registrar that is connected to the ROS master of the tests."""
     registrar = Registrar()
     yield registrar
-    registrar.flush(TIMEOUT)  # rospy keeps a topic that is not closed, with its type.
+    assert registrar.flush(TIMEOUT)  # rospy keeps a topic that is not closed, with its type.
     registrar.close(TIMEOUT)

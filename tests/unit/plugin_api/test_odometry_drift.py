@@ -209,7 +209,7 @@ class TestVelocity:
     def test_covariance(self) -> None:
         velocity = (0.6, 0.5 * 1.0, 0.5)
         samples = np.array(
-            [drift(self.PARAMETERS, k, center=LEVER).measure(velocity) for k in range(1, 2001)]
+            [drift(self.PARAMETERS, k, center=LEVER).measure(velocity) for k in range(1, SEEDS + 1)]
         )
         found = drift(self.PARAMETERS, center=LEVER).twist_covariance(velocity)
         check_covariance(samples, found[np.ix_((0, 1, 5), (0, 1, 5))])

@@ -99,6 +99,24 @@ def test_a_late_subscriber_receives_existing_contacts(plugin_world: Any, files: 
     assert len(collision.magnitude_forces) == 1
 
 
+def test_a_contact_of_a_body_that_sleeps_has_no_points(plugin_world: Any, files: Any) -> None:
+    world = touching(plugin_world, files)
+    output = world.output("/collisions")
+    body = world.models[0].bodies[0]
+    world.step()
+    while body.physics.awake:
+        (collision,) = output.latest.collisions
+        assert len(collision.contact_positions) == 1
+        world.step()
+        assert world.time < 5.0
+    assert world.time > 0.5
+    world.step()
+    (collision,) = output.latest.collisions
+    assert (collision.entity_b, collision.body_b) == ("obstacle", "slab")
+    sizes = map(len, (collision.contact_positions, collision.contact_normals))
+    assert [*sizes, len(collision.magnitude_forces)] == [0, 0, 0]
+
+
 def test_walls_of_a_layer(plugin_world: Any, files: Any) -> None:
     map_path = files.write_map("room", ["...", ".#.", "..."], origin="[0.2, -1.5, 0]")
     world = plugin_world(
