@@ -376,6 +376,7 @@ DRIVER = dedent(
     rospy.init_node("driver")
     poses = queue.SimpleQueue()
     rospy.Subscriber("odometry/ground_truth", Odometry, poses.put)
+    rospy.on_shutdown(lambda: poses.put(None))  # No message follows.
     drive = rospy.Publisher("cmd_vel", Twist, queue_size=1)
     transform = TransformStamped()
     transform.header.frame_id, transform.child_frame_id = "base_link", "estimate"
@@ -411,6 +412,12 @@ DRIVER = dedent(
         command.angular.z = 3 * bearing
         return command
 
+    def pose_since(stamp):
+        for message in iter(poses.get, None):
+            if message.header.stamp >= stamp:
+                return message.pose.pose
+        return None
+
     rospy.wait_for_service("step_world")
     step_world = rospy.ServiceProxy("step_world", StepWorld, persistent=True)
     while poses.empty() or not drive.get_num_connections():
@@ -418,14 +425,9 @@ DRIVER = dedent(
         time.sleep(0.01)
     server = actionlib.SimpleActionServer("move_base", MoveBaseAction, execute, auto_start=False)
     server.start()
-    while not rospy.is_shutdown():
-        stamp = step_world(0.02).stamp
-        message = poses.get()
-        while message.header.stamp < stamp - rospy.Duration(0.02):
-            message = poses.get()
-        p, q = message.pose.pose.position, message.pose.pose.orientation
-        pose = p.x, p.y, 2 * math.atan2(q.z, q.w)
-        drive.publish(command_to(target, *pose))
+    while pose := pose_since(step_world(0.02).stamp - rospy.Duration(0.02)):
+        p, q = pose.position, pose.orientation
+        drive.publish(command_to(target, p.x, p.y, 2 * math.atan2(q.z, q.w)))
         # In real time without a goal: the time until others receive a result counts as well.
         time.sleep(0.02 if target is None or target[2].is_set() else 0.005)
     """
