@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -80,18 +81,17 @@ def ros_environment(environment: dict[str, str], ros_programs: Path) -> dict[str
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
-    """Starts programs, which are stopped at the end of the test."""
-    started: list[Program] = []
+    """Starts programs, which are all stopped at the end of the test, even if one does not end."""
+    with ExitStack() as stopping:
 
-    def start_program(
-        command: Sequence[str | Path], environment: Mapping[str, str], folder: Path = tmp_path
-    ) -> Program:
-        started.append(Program(command, env=environment, cwd=folder))
-        return started[-1]
+        def start_program(
+            command: Sequence[str | Path], environment: Mapping[str, str], folder: Path = tmp_path
+        ) -> Program:
+            program = Program(command, env=environment, cwd=folder)
+            stopping.callback(program.stop)
+            return program
 
-    yield start_program
-    for program in reversed(started):
-        program.stop()
+        yield start_program
 
 
 @pytest.fixture
