@@ -78,6 +78,21 @@ class World:
             StaleHandleError: The world is closed.
             WorldLockedError: The world is stepping.
         """
+    def share_walls(self) -> None:
+        """Makes all further copies of the world share the walls, which saves memory and time.
+
+        Walls are static bodies that have only edges and no joints. Contacts with them end, and the next
+        step finds them again. The solver may process contacts in another order than without this call, so
+        that results may differ by rounding. A change of a body or a fixture with shared walls ends the
+        sharing of this world. Idempotent.
+
+        Raises:
+            StaleHandleError: The world is closed.
+            WorldLockedError: The world is stepping.
+        """
+    @property
+    def shared_fixtures(self) -> int:
+        """Number of fixtures that the world shares with its copies; see `share_walls`."""
     def object_counts(self) -> ObjectCounts:
         """Returns the numbers of objects.
 

@@ -86,6 +86,7 @@ class Stage:
             self._stocks: list[Stock] = []
             for building in range(settings.building_count):
                 original = undo.enter_context(settings.load(building))
+                original.physics.share_walls()
                 if not self._stocks and max(len(names), settings.building_count) > 1:
                     _check_memory(len(names), settings.building_count, original.snapshot().size)
                 self._stocks.append(Stock(building, original, find_agents))

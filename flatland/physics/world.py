@@ -60,7 +60,8 @@ class PhysicsWorld(_core.World):
         """Returns an independent copy with the same ids and without a function `pre_solve`.
 
         The copy is exact: the same calls have the same results, bit by bit. It shares only what
-        never changes: trees of edges and sorted rays. Copies may be used in different threads.
+        never changes: trees of edges, sorted rays, and the walls after `share_walls`. Copies may
+        be used in different threads.
 
         Raises:
             StaleHandleError: The world is closed.

@@ -31,8 +31,10 @@ if TYPE_CHECKING:
     from flatland.timekeeper import Timekeeper
 
 _LOG = logging.getLogger("flatland")
-# Memory of a snapshot, measured with worlds of 3000 map edges and of 100 robots [bytes].
-BYTES_PER_FIXTURE: Final = 350
+# Memory of a copy, measured with worlds of 3000 shared or other map edges, and 100 robots [bytes].
+_BYTES_PER_WORLD: Final = 160_000
+_BYTES_PER_FIXTURE: Final = 330
+_BYTES_PER_SHARED_FIXTURE: Final = 16
 _BYTES_PER_OBJECT: Final = 520
 _ADVICE: Final = (
     'the class can define __getstate__ and __setstate__, see "Snapshots" in docs/write_a_plugin.md'
@@ -92,8 +94,7 @@ class WorldSnapshot:
         self._models = models
         self._world_plugins = world_plugins
         self._ports = ports
-        fixtures = physics.object_counts().fixtures
-        self.size = BYTES_PER_FIXTURE * fixtures + _BYTES_PER_OBJECT * len(objects)
+        self.size = size_of(physics) + _BYTES_PER_OBJECT * len(objects)
 
     @property
     def time(self) -> float:
@@ -102,6 +103,13 @@ class WorldSnapshot:
 
     def __repr__(self) -> str:
         return f"<WorldSnapshot at {self.time:.3f} s, models: {len(self._models)}>"
+
+
+def size_of(physics: PhysicsWorld) -> int:
+    """Returns the estimated memory of a copy of a physics world [bytes]."""
+    shared = physics.shared_fixtures
+    own = physics.object_counts().fixtures - shared
+    return _BYTES_PER_WORLD + _BYTES_PER_FIXTURE * own + _BYTES_PER_SHARED_FIXTURE * shared
 
 
 class _Ports:

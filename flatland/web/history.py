@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from flatland.errors import PLUGIN_FAULTS, FlatlandError
-from flatland.runtime.snapshot import BYTES_PER_FIXTURE, WorldSnapshot
+from flatland.runtime.snapshot import WorldSnapshot, size_of
 from flatland.world import World
 
 PERIOD: Final = 1.0  # s of wall time between two regular snapshots, if they cost little
@@ -204,8 +204,7 @@ class History:
         if world.stepping.change_log is not None:
             # A recording contains each snapshot, and its repetition keeps all of them.
             return "states are not kept while the world is recorded"
-        size = BYTES_PER_FIXTURE * world.physics.object_counts().fixtures
-        if size > _MAX_SHARE_OF_BYTES * MAX_BYTES:
+        if size_of(world.physics) > _MAX_SHARE_OF_BYTES * MAX_BYTES:
             return "the map is too large to keep earlier states of the world"
         return ""
 

@@ -57,7 +57,7 @@ py::array_t<bool> free_at(World& world, const Probe& probe, const Poses& poses) 
   // Safe without the GIL: `use` prevents changes of the world, so the bodies of the probe remain
   // valid; the result is not shared yet, and `poses` keeps its memory alive.
   World::SharedUse use(world);
-  without_gil(use, [&] { find_free_poses(world.engine(), probe, in, count, out); });
+  without_gil(use, [&] { find_free_poses(world.engines(), probe, in, count, out); });
   return is_free;
 }
 
@@ -69,7 +69,7 @@ std::vector<BodyHandle> py_overlapping_bodies(const PyWorld& world, const Bodies
   core.check_readable();
   const Probe probe = model_probe(core, bodies, ignored, least_gap);
   std::vector<BodyHandle> found;
-  for (const Id id : overlapping_bodies(core.engine(), probe, transform)) {
+  for (const Id id : overlapping_bodies(core.engines(), probe, transform)) {
     found.emplace_back(world, id);
   }
   return found;

@@ -62,7 +62,7 @@ Fractions py_cast_rays_reference(World& world, const PyPose& pose, const Ends& e
                                  std::int64_t mask, std::int64_t reflect_mask) {
   return scan(world, pose, ends, mask, reflect_mask, 0,
               [&](const BeamFan&, const ScanRequest& request, const ScanResult& result) {
-                cast_rays_reference(world.engine(), request, result);
+                cast_rays_reference(world.engines(), request, result);
               });
 }
 
@@ -71,7 +71,7 @@ std::optional<PyRayHit> py_ray_cast(const PyWorld& world, const PyPoint& start, 
   const b2Vec2 from = checked_point(start, "start");
   const b2Vec2 to = checked_point(end, "end");
   world.core->check_readable();
-  const auto hit = ray_cast(world.core->engine(), from, to, checked_bits(mask, "mask"));
+  const auto hit = ray_cast(world.core->engines(), from, to, checked_bits(mask, "mask"));
   if (!hit) return std::nullopt;
   return make_value<PyRayHit>(hit->fraction, to_python(hit->point), to_python(hit->normal),
                               FixtureHandle(world, hit->fixture), hit->category_bits);

@@ -68,6 +68,25 @@ Raises:
     StaleHandleError: The world is closed.
     WorldLockedError: The world is stepping.
 )");
+  world.def("share_walls", &World::share_walls, R"(
+Makes all further copies of the world share the walls, which saves memory and time.
+
+Walls are static bodies that have only edges and no joints. Contacts with them end, and the next
+step finds them again. The solver may process contacts in another order than without this call, so
+that results may differ by rounding. A change of a body or a fixture with shared walls ends the
+sharing of this world. Idempotent.
+
+Raises:
+    StaleHandleError: The world is closed.
+    WorldLockedError: The world is stepping.
+)");
+  world.def_property_readonly(
+      "shared_fixtures",
+      [](const World& self) {
+        self.check_readable();
+        return self.walls().are_shared() ? self.walls().shared()->fixtures().size() : 0;
+      },
+      "Number of fixtures that the world shares with its copies; see `share_walls`.");
   world.def(
       "object_counts",
       [](const World& self) {

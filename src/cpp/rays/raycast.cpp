@@ -12,6 +12,7 @@
 #include "rays/ray_scene.h"
 #include "rays/scene_view.h"
 #include "world/contacts.h"
+#include "world/shared_walls.h"
 
 namespace flatland {
 namespace {
@@ -27,6 +28,7 @@ class ClosestHit final : public b2RayCastCallback {
     if (fixture->IsSensor() || !masks_.pass(category)) return kIgnore;
     // An overflow in the solver can make the pose of a body not finite.
     if (std::isnan(fraction)) return kIgnore;
+    if (hit && fraction >= hit->fraction) return hit->fraction;
     hit = RayHit{fraction, point, normal, id_of(fixture), category};
     return fraction;
   }
@@ -37,33 +39,33 @@ class ClosestHit final : public b2RayCastCallback {
   RayMasks masks_;
 };
 
-std::optional<RayHit> closest(const b2World& world, const b2Vec2& from, const b2Vec2& to,
+std::optional<RayHit> closest(const Engines& engines, const b2Vec2& from, const b2Vec2& to,
                               RayMasks masks) {
   // Box2D aborts if the squared length of a ray is zero. Underflow can be the reason.
   if (!((to - from).LengthSquared() > 0.0F)) return std::nullopt;
   ClosestHit callback(masks);
-  world.RayCast(&callback, from, to);
+  engines.for_each([&](const b2World& engine) { engine.RayCast(&callback, from, to); });
   return callback.hit;
 }
 
 }  // namespace
 
-std::optional<RayHit> ray_cast(const b2World& world, const b2Vec2& from, const b2Vec2& to,
+std::optional<RayHit> ray_cast(const Engines& engines, const b2Vec2& from, const b2Vec2& to,
                                std::uint16_t mask) {
-  return closest(world, from, to, {mask, kAnyCategory});
+  return closest(engines, from, to, {mask, kAnyCategory});
 }
 
-void cast_rays_reference(const b2World& world, const ScanRequest& request,
+void cast_rays_reference(const Engines& engines, const ScanRequest& request,
                          const ScanResult& result) {
   const b2Vec2 from = request.pose.p;
   for (std::size_t i = 0; i < request.count; ++i) {
     const b2Vec2 end(request.ends[2 * i], request.ends[2 * i + 1]);
     const b2Vec2 to = b2Mul(request.pose, end);
-    const auto hit = closest(world, from, to, {request.mask, kAnyCategory});
+    const auto hit = closest(engines, from, to, {request.mask, kAnyCategory});
     result.fractions[i] = hit ? hit->fraction : std::numeric_limits<float>::quiet_NaN();
     result.reflect[i] = false;
     if (!hit || request.reflect_mask == 0) continue;
-    const auto reflection = closest(world, from, to, {request.mask, request.reflect_mask});
+    const auto reflection = closest(engines, from, to, {request.mask, request.reflect_mask});
     if (!reflection) continue;
     const float length = end.Length();
     const float gap = (reflection->fraction - hit->fraction) * length;

@@ -9,12 +9,11 @@
 
 #include "world/slot_map.h"
 
-class b2World;
-
 namespace flatland {
 
 class BeamFan;
 class RayScene;
+struct Engines;
 
 // The nearest hit of a ray, in the world frame.
 struct RayHit {
@@ -49,11 +48,11 @@ inline constexpr float kFractionTolerance = 1e-5F;
 
 // Returns the nearest hit of a fixture that has a category in the mask and is not a sensor. A ray
 // of zero length is a miss.
-std::optional<RayHit> ray_cast(const b2World& world, const b2Vec2& from, const b2Vec2& to,
+std::optional<RayHit> ray_cast(const Engines& engines, const b2Vec2& from, const b2Vec2& to,
                                std::uint16_t mask);
 
 // Performs a scan with b2World::RayCast. This is slow, and the reference in tests of `cast_rays`.
-void cast_rays_reference(const b2World& world, const ScanRequest& request,
+void cast_rays_reference(const Engines& engines, const ScanRequest& request,
                          const ScanResult& result);
 
 // Performs a scan with a depth buffer; see depth_scan.h. The fan must have the end points of the

@@ -39,6 +39,7 @@ FLATLAND_EXPOSE(b2Body, b2World*, m_world, BodyWorld);
 FLATLAND_EXPOSE(b2Body, b2Body*, m_prev, BodyPrevious);
 FLATLAND_EXPOSE(b2Body, b2Body*, m_next, BodyNext);
 FLATLAND_EXPOSE(b2Body, b2Fixture*, m_fixtureList, BodyFixtures);
+FLATLAND_EXPOSE(b2Body, int32, m_fixtureCount, BodyFixtureCount);
 FLATLAND_EXPOSE(b2Body, b2JointEdge*, m_jointList, BodyJoints);
 FLATLAND_EXPOSE(b2Body, b2ContactEdge*, m_contactList, BodyContacts);
 FLATLAND_EXPOSE(b2Body, b2Transform, m_xf, BodyTransform);

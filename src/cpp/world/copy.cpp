@@ -39,9 +39,10 @@ class EngineCopier {
   using Joints = SlotMap<JointRecord, IdKind::kJoint>;
 
   // The maps of ids are copies of the maps of the source, in which the values are replaced.
-  EngineCopier(const b2World& source, b2World& target, Bodies& bodies, Fixtures& fixtures,
-               Joints& joints)
+  EngineCopier(const b2World& source, const NearWalls& walls, b2World& target, Bodies& bodies,
+               Fixtures& fixtures, Joints& joints)
       : source_(source),
+        source_walls_(walls),
         target_(target),
         allocator_(get<members::WorldAllocator>(target)),
         bodies_(bodies),
@@ -50,6 +51,7 @@ class EngineCopier {
 
   void copy() {
     copy_bodies();
+    walls_ = NearWalls(source_walls_, target_);
     copy_joints();
     copy_contacts();
     copy_broad_phase();
@@ -58,7 +60,12 @@ class EngineCopier {
   }
 
   b2Body* copy_of(const b2Body* body) { return *bodies_.find(id_of(body)); }
-  b2Fixture* copy_of(const b2Fixture* fixture) { return *fixtures_.find(id_of(fixture)); }
+  b2Fixture* copy_of(const b2Fixture* fixture) {
+    b2Fixture* wall = walls_.find(*fixture);
+    return wall != nullptr ? wall : *fixtures_.find(id_of(fixture));
+  }
+  // The walls of the copy.
+  NearWalls take_walls() { return std::move(walls_); }
   const std::unordered_map<const b2Contact*, const b2Contact*>& contacts() const {
     return contacts_;
   }
@@ -72,6 +79,7 @@ class EngineCopier {
   // part cannot fail.
   void begin_revert() {
     is_revert_ = true;
+    walls_ = NearWalls(source_walls_, target_);
     create_contacts();
   }
   void revert() {
@@ -80,6 +88,7 @@ class EngineCopier {
     revert_joints();
     link_contacts();
     copy_broad_phase();
+    set_wall_proxies();
     copy_times();
   }
 
@@ -110,15 +119,12 @@ class EngineCopier {
 
   void copy_fixtures(const b2Body& body, b2Body& body_copy) {
     b2Fixture** end = &get<members::BodyFixtures>(body_copy);
+    if (has_shared_walls(body)) {
+      *end = const_cast<b2Fixture*>(body.GetFixtureList());
+      return;
+    }
     for (const b2Fixture* f = body.GetFixtureList(); f != nullptr; f = f->GetNext()) {
-      b2Fixture* copy = duplicate(*f);
-      get<members::FixtureNext>(*copy) = nullptr;
-      get<members::FixtureBody>(*copy) = &body_copy;
-      get<members::FixtureShape>(*copy) = f->GetShape()->Clone(&allocator_);
-      // All shapes have one child, hence one proxy.
-      b2FixtureProxy* proxy = duplicate(get<members::FixtureProxies>(*f)[0]);
-      proxy->fixture = copy;
-      get<members::FixtureProxies>(*copy) = proxy;
+      b2Fixture* copy = duplicate_fixture(*f, body_copy, allocator_);
       *end = copy;
       end = &get<members::FixtureNext>(*copy);
       *fixtures_.find(id_of(f)) = copy;
@@ -353,11 +359,21 @@ class EngineCopier {
     b2TreeNode* nodes = get<members::TreeNodes>(tree);
     for (int32 i = 0; i < get<members::TreeCapacity>(tree); ++i) nodes[i].userData = nullptr;
     for (b2Body* body = target_.GetBodyList(); body != nullptr; body = body->GetNext()) {
+      if (has_shared_walls(*body)) continue;
       for (b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) {
         b2FixtureProxy* proxy = get<members::FixtureProxies>(*f);
         nodes[proxy->proxyId].userData = proxy;
       }
     }
+    set_wall_proxies();
+  }
+
+  void set_wall_proxies() {
+    b2TreeNode* nodes = get<members::TreeNodes>(tree_of(target_));
+    walls_.for_each([nodes](const b2Fixture& fixture) {
+      b2FixtureProxy* proxy = get<members::FixtureProxies>(fixture);
+      nodes[proxy->proxyId].userData = proxy;
+    });
   }
 
   void copy_times() {
@@ -380,12 +396,14 @@ class EngineCopier {
   }
 
   const b2World& source_;
+  const NearWalls& source_walls_;
   b2World& target_;
   b2BlockAllocator& allocator_;
   Bodies& bodies_;
   Fixtures& fixtures_;
   Joints& joints_;
   std::unordered_map<const b2Contact*, const b2Contact*> contacts_;
+  NearWalls walls_;
   bool is_revert_ = false;
   std::vector<b2Contact*> created_;  // the copies of contacts, in the order of the list
 };
@@ -396,11 +414,11 @@ void World::become_copy_of(World& source) {
   source.check_readable();
   check_changeable();
   if (&source == this || revert_to(source)) return;
-  auto engine = std::make_unique<b2World>(b2Vec2(0.0F, 0.0F));
+  Engine engine = make_engine();
   auto bodies = source.bodies_;
   auto fixtures = source.fixtures_;
   auto joints = source.joints_;
-  EngineCopier copier(*source.engine_, *engine, bodies, fixtures, joints);
+  EngineCopier copier(*source.engine_, source.walls_, *engine, bodies, fixtures, joints);
   copier.copy();
   bodies.exclude_ids_of(bodies_);
   fixtures.exclude_ids_of(fixtures_);
@@ -411,6 +429,7 @@ void World::become_copy_of(World& source) {
       [&](const b2Fixture* fixture) { return copier.copy_of(fixture); });
   // The statements below cannot fail.
   engine_ = std::move(engine);
+  walls_ = copier.take_walls();
   bodies_ = std::move(bodies);
   fixtures_ = std::move(fixtures);
   joints_ = std::move(joints);
@@ -421,12 +440,14 @@ void World::become_copy_of(World& source) {
 
 bool World::revert_to(World& source) {
   if (structure_ != source.structure_) return false;
-  EngineCopier copier(*source.engine_, *engine_, bodies_, fixtures_, joints_);
+  EngineCopier copier(*source.engine_, source.walls_, *engine_, bodies_, fixtures_, joints_);
   if (!copier.can_revert()) return false;
   copier.begin_revert();
   OtherParts parts = copy_others(source, copier.contacts());
   // The statements below cannot fail.
   copier.revert();
+  walls_.destroy(*engine_);
+  walls_ = copier.take_walls();
   replace_others(source, std::move(parts));
   return true;
 }
@@ -449,7 +470,7 @@ void World::replace_others(const World& source, OtherParts parts) {
 
 void World::clear() {
   check_changeable();
-  auto engine = std::make_unique<b2World>(b2Vec2(0.0F, 0.0F));
+  Engine engine = make_engine();
   SlotMap<b2Body*, IdKind::kBody> bodies;
   SlotMap<b2Fixture*, IdKind::kFixture> fixtures;
   SlotMap<JointRecord, IdKind::kJoint> joints;
@@ -461,6 +482,7 @@ void World::clear() {
   jobs_.clear();
   rays_.clear();
   engine_ = std::move(engine);
+  walls_ = NearWalls();
   bodies_ = std::move(bodies);
   fixtures_ = std::move(fixtures);
   joints_ = std::move(joints);

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "world/contacts.h"
+#include "world/shared_walls.h"
 #include "world/world.h"
 
 namespace flatland {
@@ -117,7 +118,7 @@ class FindOverlaps final : public b2QueryCallback {
  public:
   FindOverlaps(const Probe& probe, bool all) : probe_(probe), all_(all) {}
 
-  void find(const b2World& world, const ProbePart& part, const b2Transform& pose) {
+  void find(const Engines& engines, const ProbePart& part, const b2Transform& pose) {
     part_ = &part;
     hull_ = moved(part.hull, pose);
     b2AABB box{hull_.points[0], hull_.points[0]};
@@ -128,7 +129,7 @@ class FindOverlaps final : public b2QueryCallback {
     const float margin = hull_.radius + std::max(probe_.least_gap, 0.0F);
     box.lowerBound -= b2Vec2(margin, margin);
     box.upperBound += b2Vec2(margin, margin);
-    world.QueryAABB(this, box);
+    engines.for_each([&](const b2World& engine) { engine.QueryAABB(this, box); });
   }
 
   bool ReportFixture(b2Fixture* fixture) override {
@@ -146,8 +147,8 @@ class FindOverlaps final : public b2QueryCallback {
  private:
   bool is_relevant(const b2Fixture& fixture) const {
     const b2Body* body = fixture.GetBody();
-    const auto contains = [body](const std::vector<const b2Body*>& bodies) {
-      return std::binary_search(bodies.begin(), bodies.end(), body);
+    const auto contains = [body](const std::vector<Id>& bodies) {
+      return std::binary_search(bodies.begin(), bodies.end(), id_of(body));
     };
     // Edges do not collide with edges.
     const bool are_edges = part_->hull.count == 2 && fixture.GetType() == b2Shape::e_edge;
@@ -164,12 +165,10 @@ class FindOverlaps final : public b2QueryCallback {
 
 }  // namespace
 
-std::vector<const b2Body*> sorted_bodies(const World& world, const std::vector<Id>& ids) {
-  std::vector<const b2Body*> bodies;
-  bodies.reserve(ids.size());
-  for (const Id id : ids) bodies.push_back(world.read_body(id));
-  std::sort(bodies.begin(), bodies.end());
-  return bodies;
+std::vector<Id> sorted_bodies(const World& world, std::vector<Id> ids) {
+  for (const Id id : ids) world.read_body(id);  // throws if it does not exist
+  std::sort(ids.begin(), ids.end());
+  return ids;
 }
 
 Probe probe_of_bodies(const World& world, const std::vector<Id>& bodies) {
@@ -198,16 +197,16 @@ Probe probe_of_disc(float radius, std::uint16_t bits) {
   return probe;
 }
 
-std::vector<Id> overlapping_bodies(const b2World& world, const Probe& probe,
+std::vector<Id> overlapping_bodies(const Engines& engines, const Probe& probe,
                                    const b2Transform& pose) {
   FindOverlaps finder(probe, true);
-  for (const ProbePart& part : probe.parts) finder.find(world, part, pose);
+  for (const ProbePart& part : probe.parts) finder.find(engines, part, pose);
   std::sort(finder.found.begin(), finder.found.end());
   finder.found.erase(std::unique(finder.found.begin(), finder.found.end()), finder.found.end());
   return std::move(finder.found);
 }
 
-void find_free_poses(const b2World& world, const Probe& probe, const double* poses,
+void find_free_poses(const Engines& engines, const Probe& probe, const double* poses,
                      std::size_t count, bool* is_free) {
   FindOverlaps finder(probe, false);
   for (std::size_t i = 0; i < count; ++i) {
@@ -216,7 +215,7 @@ void find_free_poses(const b2World& world, const Probe& probe, const double* pos
                            b2Rot(static_cast<float>(values[2])));
     finder.found.clear();
     for (const ProbePart& part : probe.parts) {
-      finder.find(world, part, pose);
+      finder.find(engines, part, pose);
       if (!finder.found.empty()) break;
     }
     is_free[i] = finder.found.empty();

@@ -17,11 +17,10 @@
 
 #include "world/slot_map.h"
 
-class b2World;
-
 namespace flatland {
 
 class World;
+struct Engines;
 
 // The convex hull of up to 8 points, enlarged by a radius; represents circles, edges and polygons.
 struct Hull {
@@ -42,9 +41,9 @@ struct ProbePart {
 // A rigid set of shapes, and the bodies that they may overlap.
 struct Probe {
   std::vector<ProbePart> parts;
-  std::vector<const b2Body*> ignored;              // sorted; includes the bodies of the probe
-  std::optional<std::vector<const b2Body*>> only;  // sorted; bodies that are considered
-  float least_gap = 0.0F;  // [m] distance below which shapes overlap; may be negative
+  std::vector<Id> ignored;              // bodies, sorted; includes those of the probe
+  std::optional<std::vector<Id>> only;  // bodies that are considered, sorted
+  float least_gap = 0.0F;               // [m] distance below which shapes overlap; may be negative
 };
 
 // Returns the solid fixtures of bodies at their current relative poses, in the frame of the first
@@ -54,15 +53,15 @@ Probe probe_of_bodies(const World& world, const std::vector<Id>& bodies);
 // Returns a disc around the origin with the same category and mask bits.
 Probe probe_of_disc(float radius, std::uint16_t bits);
 
-// Returns the bodies with the ids, sorted. Throws StaleHandleError or WorldLockedError.
-std::vector<const b2Body*> sorted_bodies(const World& world, const std::vector<Id>& ids);
+// Returns the ids of bodies, sorted. Throws StaleHandleError or WorldLockedError.
+std::vector<Id> sorted_bodies(const World& world, std::vector<Id> ids);
 
 // Returns the sorted, unique ids of the bodies that the probe overlaps at a pose.
-std::vector<Id> overlapping_bodies(const b2World& world, const Probe& probe,
+std::vector<Id> overlapping_bodies(const Engines& engines, const Probe& probe,
                                    const b2Transform& pose);
 
 // Determines for each of `count` poses (x, y, theta) whether the probe overlaps no body.
-void find_free_poses(const b2World& world, const Probe& probe, const double* poses,
+void find_free_poses(const Engines& engines, const Probe& probe, const double* poses,
                      std::size_t count, bool* is_free);
 
 }  // namespace flatland

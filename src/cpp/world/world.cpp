@@ -68,7 +68,7 @@ void check_step(double dt, int velocity_iterations, int position_iterations) {
 
 }  // namespace
 
-World::World() : engine_(std::make_unique<b2World>(b2Vec2(0.0F, 0.0F))) {
+World::World() : engine_(make_engine()) {
   initialize_contact_table();
   structure_changed();
   listen();
@@ -93,6 +93,7 @@ void World::close() {
   invalid_.clear();
   jobs_.clear();
   engine_.reset();
+  walls_ = NearWalls();
   interrupt();
 }
 
@@ -119,7 +120,11 @@ StepReport World::step_unchecked(double dt, int velocity_iterations, int positio
   // A hook is called within the step, and may read the state of any body.
   const bool is_done =
       hook == nullptr && free_motion_.begin(*engine_, seconds, position_iterations);
-  if (!is_done) engine_->Step(seconds, velocity_iterations, position_iterations);
+  if (!is_done) {
+    walls_.create(*engine_, seconds);
+    engine_->Step(seconds, velocity_iterations, position_iterations);
+    walls_.create(*engine_, 0.0F);
+  }
   if (hook == nullptr) free_motion_.end();
   contacts_.hook = nullptr;
   StepReport report = guard.end(*engine_);
@@ -266,11 +271,14 @@ const JointRecord& World::read_joint(Id id) const {
 
 b2Body* World::change_body(Id id) {
   check_changeable();
-  return const_cast<b2Body*>(read_body(id));
+  auto* body = const_cast<b2Body*>(read_body(id));
+  if (has_shared_walls(*body)) own_walls();
+  return body;
 }
 
 b2Fixture* World::change_fixture(Id id) {
   check_changeable();
+  if (has_shared_walls(*read_body(id_of(read_fixture(id)->GetBody())))) own_walls();
   return const_cast<b2Fixture*>(read_fixture(id));
 }
 
@@ -313,6 +321,7 @@ Id World::add_body(const b2BodyDef& definition) {
 }
 
 Id World::add_fixture(b2Body* body, const b2FixtureDef& definition) {
+  if (has_shared_walls(*body)) own_walls();
   structure_changed();
   b2Fixture* fixture = body->CreateFixture(&definition);
   ensure_mass(body);
@@ -339,7 +348,27 @@ Id World::add_joint(const b2JointDef& definition, float frequency, float damping
 
 void World::find_new_contacts() {
   check_changeable();
+  walls_.create(*engine_, 0.0F);
   const_cast<b2ContactManager&>(engine_->GetContactManager()).FindNewContacts();
+}
+
+void World::share_walls() {
+  check_changeable();
+  if (walls_.are_shared()) return;
+  walls_.share(*engine_);
+  if (!walls_.are_shared()) return;
+  structure_changed();
+  for (b2Fixture* fixture : walls_.shared()->fixtures()) *fixtures_.find(id_of(fixture)) = fixture;
+}
+
+void World::own_walls() {
+  structure_changed();
+  const std::vector<b2Body*> bodies = walls_.own(*engine_);
+  for (b2Body* body : bodies) {
+    for (b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) {
+      *fixtures_.find(id_of(f)) = f;
+    }
+  }
 }
 
 void World::destroy_body(Id id) {

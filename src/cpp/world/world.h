@@ -29,6 +29,7 @@
 #include "world/contacts.h"
 #include "world/free_motion.h"
 #include "world/job_queue.h"
+#include "world/shared_walls.h"
 #include "world/slot_map.h"
 
 namespace flatland {
@@ -153,6 +154,10 @@ class World final : private b2DestructionListener {
   void skip_static_fixtures(int32 pending_before);
   // Searches for pairs of fixtures that may touch, which the next step would do otherwise.
   void find_new_contacts();
+  // Replaces the fixtures of static bodies that have only edges by walls that all copies of this
+  // world share; see shared_walls.h. Contacts with them end. A change of such a body gives the
+  // world fixtures of its own again.
+  void share_walls();
   Id add_joint(const b2JointDef& definition, float frequency, float damping_ratio);
   void destroy_body(Id id);
   void destroy_joint(Id id);
@@ -167,6 +172,11 @@ class World final : private b2DestructionListener {
   void fixture_changed(const b2Fixture* fixture);
 
   const b2World& engine() const { return *engine_; }
+  const NearWalls& walls() const { return walls_; }
+  // The Box2D worlds for queries of all fixtures.
+  Engines engines() const {
+    return {*engine_, walls_.are_shared() ? &walls_.shared()->engine() : nullptr};
+  }
   ContactRecorder& contacts() { return contacts_; }
   const ContactRecorder& contacts() const { return contacts_; }
   RayScene& rays() { return rays_; }
@@ -242,13 +252,16 @@ class World final : private b2DestructionListener {
   bool is_interrupted() const { return interrupts() != cleared_.load(std::memory_order_relaxed); }
   [[noreturn]] void throw_locked() const;
   void wait_for_readers() const;
+  // Makes the walls of this world fixtures of its own.
+  void own_walls();
 
   // What comes next in a step.
   enum class Stage : std::uint8_t { kStart, kBefore, kPhysics, kAfter };
 
   static constexpr int kExclusive = -1;
 
-  std::unique_ptr<b2World> engine_;
+  NearWalls walls_;  // outlives the engine
+  Engine engine_;
   std::uint64_t structure_ = 0;  // equal numbers of two worlds: they have the same structure
   SlotMap<b2Body*, IdKind::kBody> bodies_;
   SlotMap<b2Fixture*, IdKind::kFixture> fixtures_;

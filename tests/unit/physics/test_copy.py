@@ -52,6 +52,7 @@ class Calls:
             self.change_filter,
             self.change_sensor,
             self.cast_rays,
+            self.world.share_walls,
         ]
         for _ in range(count):
             self.rng.choice(calls)()
@@ -205,6 +206,7 @@ def test_a_world_can_be_reverted_again_and_again(seed: int) -> None:
         [calls.push, calls.step, calls.change_filter, calls.change_sensor],
         [calls.create_body, calls.destroy_body, calls.create_joint, calls.destroy_joint],
         [calls.push, calls.step],
+        [world.share_walls, calls.push, calls.step, calls.change_filter],
     ):
         for _ in range(12):
             calls.rng.choice(changes)()
