@@ -205,3 +205,34 @@ def test_too_many_environments_are_refused_with_the_memory_that_they_need(
     text = r"50000 environments need about [1-9]\d*\.\d GB, and 1\.0 GB are available"
     with pytest.raises(MemoryError, match=text):
         make(FlatlandVectorEnv, 50_000)
+
+
+def test_worlds_share_their_walls(make: Make) -> None:
+    envs = make(FlatlandVectorEnv, 3)
+    envs.reset(seed=0)
+    walls = [world.physics.shared_fixtures for world in envs.worlds]
+    assert walls == 3 * [envs.worlds[0].physics.object_counts().fixtures - 1] != [0, 0, 0]
+    ends = 0
+    for _ in range(400):
+        _, _, terminated, truncated, _ = envs.step(np.full((3, 2), 1.0, np.float32))
+        ends += (terminated | truncated).sum()
+    assert ends > 3
+    assert [world.physics.shared_fixtures for world in envs.worlds] == walls
+
+
+def test_walls_that_an_episode_changes_are_shared_again_in_the_next_one(make: Make) -> None:
+    changed, unchanged = make(FlatlandVectorEnv, 2), make(FlatlandVectorEnv, 2)
+    for envs in (changed, unchanged):
+        envs.reset(seed=0)
+    world = changed.worlds[1]
+    edges = world.layers[0].edges
+    world.layers[0].body.set_pose(0.5, 0.0, 0.0)
+    assert world.physics.shared_fixtures == 0
+    changed.step(np.zeros((2, 2), np.float32))
+    for envs in (changed, unchanged):
+        envs.reset(seed=1)
+    assert world.physics.shared_fixtures == len(edges)
+    for _ in range(30):
+        results = [envs.step(np.ones((2, 2), np.float32)) for envs in (changed, unchanged)]
+        for one, other in zip(results[0][:4], results[1][:4], strict=True):
+            assert np.array_equal(one, other)
