@@ -11,6 +11,7 @@
 
 #include "world/box2d_members.h"
 #include "world/contacts.h"
+#include "world/step_guard.h"
 
 namespace flatland {
 namespace {
@@ -123,6 +124,14 @@ b2AABB box_of(const b2Body& body, const b2BroadPhase& broad_phase) {
   return box;
 }
 
+// Calls visit(body) for the dynamic bodies with fixtures.
+template <typename Visit>
+void for_each_dynamic(b2World& world, Visit&& visit) {
+  for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
+    if (body->GetType() == b2_dynamicBody && body->GetFixtureList() != nullptr) visit(*body);
+  }
+}
+
 // Returns an upper bound of the speed of all points of a body without contacts [m/s].
 float speed_of(const b2Body& body, const b2AABB& box, float dt) {
   const float reach = (box.upperBound - box.lowerBound).Length();
@@ -220,9 +229,10 @@ const b2Body* SharedWalls::find_body(Id id) const {
   return nullptr;
 }
 
-std::ptrdiff_t SharedWalls::index_of(const b2Fixture& fixture) const {
+std::optional<std::size_t> SharedWalls::index_of(const b2Fixture& fixture) const {
   const auto found = indices_.find(id_of(&fixture));
-  return found == indices_.end() ? -1 : static_cast<std::ptrdiff_t>(found->second);
+  if (found == indices_.end()) return std::nullopt;
+  return found->second;
 }
 
 NearWalls::NearWalls(const NearWalls& source, b2World& copy)
@@ -237,6 +247,11 @@ NearWalls::NearWalls(const NearWalls& source, b2World& copy)
   }
 }
 
+bool NearWalls::has_invalid_body() const {
+  return std::any_of(bodies_.begin(), bodies_.end(),
+                     [](const auto& each) { return !is_finite(each.second); });
+}
+
 void NearWalls::share(b2World& world) {
   auto shared = std::make_shared<const SharedWalls>(world);
   if (shared->fixtures().empty()) return;
@@ -244,8 +259,8 @@ void NearWalls::share(b2World& world) {
   for (b2Contact *contact = world.GetContactList(), *next = nullptr; contact != nullptr;
        contact = next) {
     next = contact->GetNext();
-    const bool is_of_walls = shared->index_of(*contact->GetFixtureA()) >= 0 ||
-                             shared->index_of(*contact->GetFixtureB()) >= 0;
+    const bool is_of_walls = shared->index_of(*contact->GetFixtureA()).has_value() ||
+                             shared->index_of(*contact->GetFixtureB()).has_value();
     if (is_of_walls) manager.Destroy(contact);
   }
   for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
@@ -273,9 +288,6 @@ std::vector<b2Body*> NearWalls::own(b2World& world) {
     set_fixtures(*body, of_body);
     bodies.push_back(body);
   }
-  for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
-    if (body->GetType() == b2_dynamicBody) touch(world, *body);
-  }
   *this = NearWalls();
   return bodies;
 }
@@ -295,36 +307,39 @@ void NearWalls::create(b2World& world, float dt) {
     const float displacement = b2Min(2.0F * dt * speed, b2_maxTranslation);
     reach = kMargin + b2_aabbExtension + (1.0F + b2_aabbMultiplier) * displacement;
   }
-  for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
-    if (body->GetType() != b2_dynamicBody || body->GetFixtureList() == nullptr) continue;
-    const b2AABB box = box_of(*body, broad_phase);
-    const b2Vec2 margin(reach, reach);
-    bool is_new = false;
-    shared_->for_each_cell(
-        {box.lowerBound - margin, box.upperBound + margin}, [&](std::size_t cell) {
-          if (is_complete_[cell]) return;
-          is_complete_[cell] = true;
-          shared_->for_each_in(cell, [&](std::size_t index) {
-            if (near_.count(index) != 0) return;
-            const b2Fixture& wall = create_one(world, index);
-            is_new = is_new || b2TestOverlap(box, broad_phase.GetFatAABB(proxy_of(wall).proxyId));
-          });
-        });
-    if (is_new) touch(world, *body);
-  }
+  const b2Vec2 margin(reach, reach);
+  std::vector<b2AABB> created;
+  const auto create_in = [&](std::size_t cell) {
+    if (is_complete_[cell]) return;
+    is_complete_[cell] = true;
+    shared_->for_each_in(cell, [&](std::size_t index) {
+      if (near_.count(index) != 0) return;
+      created.push_back(broad_phase.GetFatAABB(proxy_of(create_one(world, index)).proxyId));
+    });
+  };
+  for_each_dynamic(world, [&](b2Body& body) {
+    const b2AABB box = box_of(body, broad_phase);
+    shared_->for_each_cell({box.lowerBound - margin, box.upperBound + margin}, create_in);
+  });
+  if (created.empty()) return;
+  for_each_dynamic(world, [&](b2Body& body) {
+    const b2AABB box = box_of(body, broad_phase);
+    const auto overlaps = [&](const b2AABB& wall) { return b2TestOverlap(box, wall); };
+    if (std::any_of(created.begin(), created.end(), overlaps)) touch(world, body);
+  });
 }
 
-void NearWalls::destroy(b2World& world) {
+void NearWalls::destroy(b2World& world) const {
   for (const auto& [index, fixture] : near_) {
     free_fixture(*fixture, get<members::WorldAllocator>(world));
   }
-  near_.clear();
 }
 
 b2Fixture* NearWalls::find(const b2Fixture& fixture) const {
   if (shared_ == nullptr) return nullptr;
-  const std::ptrdiff_t index = shared_->index_of(fixture);
-  const auto found = index < 0 ? near_.end() : near_.find(static_cast<std::size_t>(index));
+  const std::optional<std::size_t> index = shared_->index_of(fixture);
+  if (!index) return nullptr;
+  const auto found = near_.find(*index);
   return found == near_.end() ? nullptr : found->second;
 }
 

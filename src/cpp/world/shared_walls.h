@@ -19,6 +19,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -70,8 +71,8 @@ class SharedWalls {
   const b2Body* find_body(Id id) const;
   // All fixtures, the oldest of each body first.
   const std::vector<b2Fixture*>& fixtures() const { return fixtures_; }
-  // Returns the index of a fixture with the same id; -1 if there is none.
-  std::ptrdiff_t index_of(const b2Fixture& fixture) const;
+  // Returns the index of the fixture with the same id, if there is one.
+  std::optional<std::size_t> index_of(const b2Fixture& fixture) const;
 
   // The walls are in the cells of a grid that their boxes in the broad phase overlap.
   std::size_t cell_count() const { return columns_ * rows_; }
@@ -123,6 +124,8 @@ class NearWalls {
   NearWalls(const NearWalls& source, b2World& copy);
 
   bool are_shared() const { return shared_ != nullptr; }
+  // Whether the pose of a body with shared walls is not finite.
+  bool has_invalid_body() const;
   const SharedWalls* shared() const { return shared_.get(); }
 
   // Replaces the walls of a world by shared ones. Contacts with them end.
@@ -134,8 +137,8 @@ class NearWalls {
   // searches for contacts with them.
   void create(b2World& world, float dt);
   // Destroys the fixtures near dynamic bodies, without contacts, but not their places in the broad
-  // phase.
-  void destroy(b2World& world);
+  // phase. These walls must be replaced afterwards.
+  void destroy(b2World& world) const;
 
   // Returns the fixture of the world for one with the same id; null if it does not exist.
   b2Fixture* find(const b2Fixture& fixture) const;

@@ -124,6 +124,8 @@ StepReport World::step_unchecked(double dt, int velocity_iterations, int positio
     walls_.create(*engine_, seconds);
     engine_->Step(seconds, velocity_iterations, position_iterations);
     walls_.create(*engine_, 0.0F);
+    // The guard restores the pose of a static body that has overflowed, with its fixtures.
+    if (walls_.has_invalid_body()) own_walls();
   }
   if (hook == nullptr) free_motion_.end();
   contacts_.hook = nullptr;

@@ -271,8 +271,11 @@ def overflowing() -> tuple[PhysicsWorld, PhysicsBody, PhysicsBody]:
     return world, body, walls
 
 
-def test_overflow_is_reported_until_the_body_is_gone() -> None:
+@pytest.mark.parametrize("is_shared", [False, True])
+def test_overflow_is_reported_until_the_body_is_gone(is_shared: bool) -> None:
     world, body, walls = overflowing()
+    if is_shared:
+        world.share_walls()
     report = world.step(*STEP)
     assert isinstance(report, StepReport)
     assert body.id in report.invalid

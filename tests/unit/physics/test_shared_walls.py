@@ -188,6 +188,38 @@ def test_a_body_that_is_hit_stops_at_a_wall() -> None:
     assert abs(ball.velocity[0]) > 50.0
 
 
+def test_a_body_cannot_pass_a_distant_wall_in_the_step_in_which_it_is_hit() -> None:
+    """The ball, at rest, is 1.8 m from the wall, and would move by 2 m in the step."""
+    own, shared = pair()
+    for world in (own, shared):
+        ball = add_ball(world, SIZE - 2.0, 2.0)
+        hammer = world.create_body("kinematic", (SIZE - 2.5, 2.0, 0.0))
+        hammer.create_circle((0.0, 0.0), 0.3, density=0.0)
+        world.step(*STEP)
+        assert len(world.contacts()) == 1
+        hammer.set_velocity(200.0, 0.0, 0.0)
+        world.step(*STEP)
+        assert ball.velocity[0] == pytest.approx(-400.0, rel=0.01)
+    assert state_of(own) == state_of(shared)
+
+
+def test_a_body_that_becomes_much_faster_than_expected_hits_the_next_wall() -> None:
+    """With a restitution of 20, the ball leaves the outer wall at 300 m/s and hits a pillar."""
+    own, shared = pair()
+    for world in (own, shared):
+        ball = world.create_body("dynamic", (0.24, 4.6, 0.0))
+        ball.create_circle((0.0, 0.0), 0.2, density=1.0, restitution=20.0)
+        ball.set_velocity(-15.0, 0.0, 0.0)
+    speeds = []
+    for _ in range(3):
+        for world in (own, shared):
+            world.step(*STEP)
+        assert state_of(own) == state_of(shared)
+        speeds.append(bodies_of(shared)[2].velocity[0])
+    assert max(speeds) == pytest.approx(300.0, rel=0.01)
+    assert min(speeds) < -500.0
+
+
 def change_pose(pillars: PhysicsBody) -> None:
     pillars.set_pose(0.0, 0.0, 0.0)
 
@@ -275,6 +307,21 @@ def test_only_static_bodies_of_edges_without_joints_are_shared() -> None:
     world.share_walls()
     assert world.shared_fixtures == counts[0] + counts[1]
     assert [len(body.fixtures) for body in bodies_of(world)] == counts
+
+
+@pytest.mark.parametrize("x", [-1000.0, 0.0, 5000.0])
+def test_walls_may_be_anywhere(world: PhysicsWorld, x: float) -> None:
+    walls = world.create_body("static", (x, -x, 0.0))
+    walls.create_edges(octagon(0.0, 0.0, 3.0).astype(np.float32))
+    walls.create_edges(octagon(0.2 * x, 0.0, 3.0).astype(np.float32))
+    balls = [add_ball(world, each, -x, 2.0, 1.0) for each in (x, 1.2 * x)]
+    world.share_walls()
+    for _ in range(2000):
+        world.step(*STEP)
+    for ball, center in zip(balls, (x, 1.2 * x), strict=True):
+        assert math.hypot(ball.pose[0] - center, ball.pose[1] + x) < 2.9
+        assert math.hypot(*ball.velocity[:2]) > 1.0
+    assert world.shared_fixtures > 0
 
 
 def test_a_world_without_walls_shares_nothing(world: PhysicsWorld) -> None:
