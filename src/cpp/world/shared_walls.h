@@ -133,8 +133,8 @@ class NearWalls {
   // Replaces all shared walls by fixtures of the world. Returns their bodies.
   std::vector<b2Body*> own(b2World& world);
   // Creates the fixtures near dynamic bodies: those with which Box2D can create contacts in a step
-  // of `dt` seconds; after the step, with 0, those at places that nothing foretold. The next step
-  // searches for contacts with them.
+  // of `dt` seconds; after the step, with 0, those at places that could not be predicted. The next
+  // step searches for contacts with them.
   void create(b2World& world, float dt);
   // Destroys the fixtures near dynamic bodies, without contacts, but not their places in the broad
   // phase. These walls must be replaced afterwards.
