@@ -434,6 +434,9 @@ class RandomCalls(ControllerCalls):
     def do_find_new_contacts(self) -> None:
         self.world.find_new_contacts()
 
+    def do_share_walls(self) -> None:
+        self.world.share_walls()
+
     def do_record_contacts(self) -> None:
         self.world.record_contacts = self.rng.random() < 0.7
 

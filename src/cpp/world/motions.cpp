@@ -34,10 +34,12 @@ std::vector<SavedMotion> saved_motions(const World& world) {
 void restore_motions(World& world, const std::vector<SavedMotion>& motions) {
   world.check_changeable();
   for (const SavedMotion& motion : motions) {
-    b2Body* body = world.find_body(motion.body);
-    if (body == nullptr) continue;
+    if (!world.has_body(motion.body)) continue;
+    const b2Body& present = *world.read_body(motion.body);
+    if (present.GetType() == b2_staticBody && !is_moved(present, motion)) continue;
+    b2Body* body = world.change_body(motion.body);
     if (is_moved(*body, motion)) {
-      world.change_body(motion.body)->SetTransform(motion.transform.p, motion.sweep.a);
+      body->SetTransform(motion.transform.p, motion.sweep.a);
       if (body->GetType() == b2_staticBody) world.structure_changed();
     }
     get<BodyTransform>(*body) = motion.transform;

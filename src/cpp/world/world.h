@@ -181,10 +181,12 @@ class World final : private b2DestructionListener {
   const ContactRecorder& contacts() const { return contacts_; }
   RayScene& rays() { return rays_; }
   JobQueue& jobs() { return jobs_; }
-  // Null if the object was destroyed; for jobs.
+  // Null if the object was destroyed; for jobs, which may change it.
   b2Body* find_body(Id id) {
     b2Body* const* body = bodies_.find(id);
-    return body == nullptr ? nullptr : *body;
+    if (body == nullptr) return nullptr;
+    if (has_shared_walls(**body)) own_walls();
+    return *body;
   }
   b2Joint* find_joint(Id id) {
     const JointRecord* joint = joints_.find(id);

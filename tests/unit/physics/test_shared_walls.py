@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from flatland.physics import PhysicsBody, PhysicsWorld
+from flatland.physics import PhysicsBody, PhysicsWorld, Run
 
 DT = 0.005
 STEP = (DT, 10, 10)
@@ -264,6 +264,22 @@ def test_changed_walls_are_not_shared(change: Callable[[PhysicsBody], None]) -> 
     # The copy has the walls of before.
     assert bodies_of(copy)[1].edges().tolist() == bodies_of(building())[1].edges().tolist()
     assert len(bodies_of(copy)[1].fixtures) == copy.object_counts().fixtures - 4
+
+
+def test_walls_that_a_controller_moves_are_not_shared() -> None:
+    own, shared = building(), building()
+    for world in (own, shared):
+        world.record_contacts = False  # a contact would end the run
+        add_ball(world, 0.25, 2.0)
+        bodies_of(world)[0].control_tween(
+            (1.0, 0.0, 0.0), duration=1.0, mode="loop", easing="linear"
+        )
+    shared.share_walls()
+    for world in (own, shared):
+        world.jobs.run(*Run(0, 5_000_000, 100, DT, 10, 10))
+    assert shared.shared_fixtures == 0
+    assert bodies_of(shared)[0].pose[0] > 0.4
+    assert state_of(own) == state_of(shared)
 
 
 def test_contacts_with_walls_end_and_begin_again() -> None:
