@@ -165,6 +165,7 @@ class TestGrids:
         grid = self.draw(drawer, frames)
         assert grid.pose == pytest.approx((8, 1, math.pi / 2))
         assert (grid.resolution, grid.cells.tolist()) == (0.5, [[0, 100, -1], [1, 2, 3]])
+        assert drawer.note == ""
         assert self.draw(drawer, frames) is None
         # Moved cells need not be compressed again, which the server detects by their identity.
         frames.set("map", "odom", transform((0, 0, 0)))

@@ -90,6 +90,11 @@ def test_minimum_size_of_the_ring(load_model: Callable[[str], Any]) -> None:
     assert len(marker.controls[2].markers) == 1
 
 
+def test_only_the_outline_is_visible_with_every_tool(load_model: Callable[[str], Any]) -> None:
+    marker = model_handle(load_model("bodies: [{name: base, footprints: []}]\n"), "robot")
+    assert [control.always_visible for control in marker.controls] == [False, False, True]
+
+
 @pytest.fixture
 def load_model(files: Any) -> Callable[[str], Any]:
     return lambda text: files.load_model(text).model("robot")
