@@ -108,3 +108,9 @@ def test_points_of_invalid_shape_raise() -> None:
 
 def test_empty_array() -> None:
     assert PackedMarkers(RosWriter).packed == data(MarkerArray())
+
+
+def test_a_deletion_of_all_markers_has_a_stamp() -> None:
+    (marker,) = markers_of(PackedMarkers.deletion_of_all(RosWriter, 1_500_000_000))
+    assert marker.action == Marker.DELETEALL
+    assert (marker.header.stamp.secs, marker.header.stamp.nsecs) == (1, 500_000_000)
