@@ -13,9 +13,6 @@
 namespace flatland {
 namespace {
 
-// Number of agents that a thread takes at a time.
-constexpr std::size_t kAgentsPerJob = 4;
-
 void set_target(Motion& motion, const double* velocity) {
   std::visit(
       [&](auto& kind) {
@@ -68,11 +65,7 @@ void AgentBatch::start(const AgentCommands& commands, const Run& run, const Agen
     if (commands.steps[i] || commands.observes[i]) chosen_.push_back(i);
   }
   unfinished_.assign(chosen_.size(), std::nullopt);
-  const std::size_t parts = (chosen_.size() + kAgentsPerJob - 1) / kAgentsPerJob;
-  work_ = threads_.start(parts, num_threads, [this](std::size_t part) {
-    const std::size_t end = std::min(chosen_.size(), (part + 1) * kAgentsPerJob);
-    for (std::size_t k = part * kAgentsPerJob; k < end; ++k) perform(k);
-  });
+  work_ = threads_.start(chosen_.size(), num_threads, [this](std::size_t k) { perform(k); });
 }
 
 std::vector<UnfinishedRun> AgentBatch::finish() {

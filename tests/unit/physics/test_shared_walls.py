@@ -295,6 +295,26 @@ def test_contacts_with_walls_end_and_begin_again() -> None:
     assert len(world.contacts()) == 1
 
 
+def test_a_world_with_few_walls_becomes_one_with_many() -> None:
+    """The array of the broad phase of the first one is too small."""
+    start = building()
+    start.share_walls()
+    for i in range(3):
+        add_ball(start, 2.0, 2.0 + 4 * i, 20.0, 3.0 + i)
+    world, other = start.copy(), start.copy()
+    for _ in range(300):
+        world.step(*STEP)
+    for _ in range(2):
+        other.become_copy_of(world)
+        for _ in range(100):
+            world.step(*STEP)
+            other.step(*STEP)
+            assert state_of(world) == state_of(other)
+        other.become_copy_of(start)
+        assert state_of(other) == state_of(start)
+    assert world.shared_fixtures > 0
+
+
 def test_walls_outlive_the_world_that_shared_them() -> None:
     world = building()
     world.share_walls()
