@@ -136,6 +136,14 @@ def test_a_name_that_is_used_again_is_replaced(setup: Setup) -> None:
     assert update.erases == []
 
 
+def test_an_erased_marker_has_no_pose(setup: Setup) -> None:
+    setup.move("a", 4.0)
+    setup.server.erase("a")
+    del setup.poses["a"]
+    update, _ = setup.apply()
+    assert (update.poses, update.erases) == ([], ["a"])
+
+
 def test_a_marker_that_was_never_published_is_not_erased(setup: Setup) -> None:
     setup.insert("short")
     setup.server.erase("short")
