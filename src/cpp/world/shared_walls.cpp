@@ -41,24 +41,15 @@ bool are_walls(const b2Body& body) {
   return body.GetFixtureList() != nullptr;
 }
 
-// Returns the bodies of a world, oldest first.
-std::vector<b2Body*> bodies_of(const b2World& world) {
-  std::vector<b2Body*> bodies;
-  for (const b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
-    bodies.push_back(const_cast<b2Body*>(body));
+// Returns the objects of a list of Box2D, whose newest object is the first one, oldest first.
+template <typename Object>
+std::vector<Object*> oldest_first(const Object* newest) {
+  std::vector<Object*> objects;
+  for (const Object* each = newest; each != nullptr; each = each->GetNext()) {
+    objects.push_back(const_cast<Object*>(each));
   }
-  std::reverse(bodies.begin(), bodies.end());
-  return bodies;
-}
-
-// Returns the fixtures of a body, oldest first.
-std::vector<b2Fixture*> fixtures_of(const b2Body& body) {
-  std::vector<b2Fixture*> fixtures;
-  for (const b2Fixture* f = body.GetFixtureList(); f != nullptr; f = f->GetNext()) {
-    fixtures.push_back(const_cast<b2Fixture*>(f));
-  }
-  std::reverse(fixtures.begin(), fixtures.end());
-  return fixtures;
+  std::reverse(objects.begin(), objects.end());
+  return objects;
 }
 
 // Sets the fixtures of a body, given oldest first.
@@ -104,9 +95,9 @@ void rebuild_broad_phase(b2World& world) {
   b2BroadPhase& broad_phase = broad_phase_of(world);
   broad_phase.~b2BroadPhase();
   new (&broad_phase) b2BroadPhase();
-  for (b2Body* body : bodies_of(world)) {
+  for (b2Body* body : oldest_first(world.GetBodyList())) {
     if (has_shared_walls(*body)) continue;
-    for (b2Fixture* fixture : fixtures_of(*body)) {
+    for (b2Fixture* fixture : oldest_first(body->GetFixtureList())) {
       b2FixtureProxy& proxy = proxy_of(*fixture);
       proxy.proxyId = broad_phase.CreateProxy(proxy.aabb, &proxy);
     }
@@ -167,7 +158,7 @@ void EngineDeleter::operator()(b2World* engine) const {
 }
 
 SharedWalls::SharedWalls(const b2World& world) {
-  for (const b2Body* body : bodies_of(world)) {
+  for (const b2Body* body : oldest_first(world.GetBodyList())) {
     if (are_walls(*body)) copy_body(*body);
   }
   for (std::size_t i = 0; i < fixtures_.size(); ++i) indices_[id_of(fixtures_[i])] = i;
@@ -181,7 +172,7 @@ void SharedWalls::copy_body(const b2Body& body) {
   definition.userData = const_cast<b2Body&>(body).GetUserData();
   b2Body* copy = engine_.CreateBody(&definition);
   std::vector<b2Fixture*> fixtures;
-  for (const b2Fixture* fixture : fixtures_of(body)) {
+  for (const b2Fixture* fixture : oldest_first(body.GetFixtureList())) {
     fixtures.push_back(duplicate_fixture(*fixture, *copy, get<members::WorldAllocator>(engine_)));
     insert(broad_phase_of(engine_), *fixtures.back());
   }
@@ -266,7 +257,7 @@ void NearWalls::share(b2World& world) {
   for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
     const b2Body* walls = shared->find_body(id_of(body));
     if (walls == nullptr) continue;
-    for (b2Fixture* fixture : fixtures_of(*body)) {
+    for (b2Fixture* fixture : oldest_first(body->GetFixtureList())) {
       free_fixture(*fixture, get<members::WorldAllocator>(world));
     }
     get<members::BodyFixtures>(*body) = const_cast<b2Fixture*>(walls->GetFixtureList());

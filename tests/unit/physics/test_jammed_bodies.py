@@ -143,7 +143,7 @@ def test_no_robot_in_a_pocket_is_faster_than_commanded(seed: int) -> None:
     assert far.body.pose[0] == pytest.approx(50.0, abs=0.01)
 
 
-# With Box2D alone, or a greater bound, these break the bound within 300 steps.
+# With twice the limit in the step guard these break the bound within 300 steps.
 @example(45, "weld")
 @example(334, "revolute")
 @example(646, "weld")
