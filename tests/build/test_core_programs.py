@@ -24,7 +24,7 @@ def pool_program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_there_are_tests_of_the_thread_pool() -> None:
-    assert len(POOL_TESTS) >= 8
+    assert len(POOL_TESTS) >= 10
 
 
 @pytest.mark.parametrize("name", POOL_TESTS)

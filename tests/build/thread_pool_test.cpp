@@ -6,8 +6,10 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstdlib>
+#include <ctime>
 #include <iostream>
 #include <map>
 #include <mutex>
@@ -117,6 +119,26 @@ void test_stop() {
   }
 }
 
+// Workers are awake, asleep, or about to fall asleep when a call begins. All of them must come.
+void test_pauses() {
+  ThreadPool pool;
+  for (int i = 0; i < 3000; ++i) {
+    meet(pool, 3);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::microseconds(i * 7 % 300);
+    while (std::chrono::steady_clock::now() < end) std::this_thread::yield();
+    if (i % 100 == 99) pool.stop();
+  }
+}
+
+void test_idle_workers_sleep() {
+  ThreadPool pool;
+  for (int i = 0; i < 100; ++i) meet(pool, 3);
+  const std::clock_t before = std::clock();
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  const double used = static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
+  require(used < 0.1, "idle workers use processor time: " + std::to_string(used) + " s");
+}
+
 void test_fork() {
   ThreadPool pool;
   meet(pool, 3);
@@ -163,6 +185,8 @@ int main(int argc, char** argv) {
       {"exceptions", test_exceptions},
       {"nested_and_concurrent_calls", test_nested_and_concurrent_calls},
       {"stop", test_stop},
+      {"pauses", test_pauses},
+      {"idle_workers_sleep", test_idle_workers_sleep},
       {"fork", test_fork},
       {"available", test_available},
   };

@@ -46,6 +46,10 @@ Agent to_agent(const PyAgent& given) {
   return {&world, body.id, id_in(world, controller), id_in(world, touches), finder};
 }
 
+// Steps of agents that are expected to be shorter are not worth a second thread [s]. With the
+// scans, they take about twice as long.
+constexpr double kShortBatch = 5e-5;
+
 // Keeps the worlds of the agents alive.
 class PyAgentBatch {
  public:
@@ -98,7 +102,7 @@ class PyAgentBatch {
     const Run run = to_run(given_run);
     run.check();
     auto uses = std::make_unique<Uses>(batch_.agents(), commands);
-    is_long_ = batch_.takes_longer(kShortStep, commands, run);
+    is_long_ = batch_.takes_longer(kShortBatch, commands, run);
     // The arrays must exist until the end.
     arrays_ = {steps,      observes,     velocities, noises, poses,
                pose_rates, sensor_poses, ranges,     touched};

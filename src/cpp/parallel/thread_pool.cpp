@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <condition_variable>
 #include <csignal>
@@ -23,6 +24,19 @@ namespace {
 
 // The greatest number of threads of a call. More threads would not save time.
 constexpr std::size_t kMaxThreads = 256;
+
+// If calls follow each other within this time, the threads of the pool wait for each other actively
+// for as long, since a thread that sleeps takes about 50 us to wake up.
+constexpr std::chrono::microseconds kWakefulTime{200};
+
+using SteadyClock = std::chrono::steady_clock;
+
+// Waits actively until a condition holds, at most for `kWakefulTime`.
+template <typename Condition>
+void wait_briefly(Condition holds) {
+  const SteadyClock::time_point end = SteadyClock::now() + kWakefulTime;
+  while (!holds() && SteadyClock::now() < end) std::this_thread::yield();
+}
 
 std::size_t allowed_processors() {
   // The call fails if the set is smaller than the set of the kernel.
@@ -110,12 +124,15 @@ class ThreadPool::Crew {
     if (is_busy_.exchange(true, std::memory_order_acquire)) return false;
     hire(helpers);
     helpers = std::min(helpers, workers_.size());
+    std::size_t asleep = 0;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       batch_ = &batch;
       vacancies_ = helpers;
+      asleep = helpers - std::min(helpers, awake_);
+      is_wakeful_ = SteadyClock::now() - ended_ < kWakefulTime;
     }
-    for (std::size_t i = 0; i < helpers; ++i) work_.notify_one();
+    for (std::size_t i = 0; i < asleep; ++i) work_.notify_one();
     return true;
   }
 
@@ -123,11 +140,15 @@ class ThreadPool::Crew {
   void end() {
     {
       // Workers that have not woken up yet are no longer needed.
-      std::unique_lock<std::mutex> lock(mutex_);
+      const std::lock_guard<std::mutex> lock(mutex_);
       batch_ = nullptr;
       vacancies_ = 0;
-      done_.wait(lock, [this] { return working_ == 0; });
     }
+    wait_briefly([this] { return working_ == 0; });
+    std::unique_lock<std::mutex> lock(mutex_);
+    done_.wait(lock, [this] { return working_ == 0; });
+    ended_ = SteadyClock::now();
+    lock.unlock();
     is_busy_.store(false, std::memory_order_release);
   }
 
@@ -154,7 +175,14 @@ class ThreadPool::Crew {
   void run() {
     std::unique_lock<std::mutex> lock(mutex_);
     while (true) {
-      work_.wait(lock, [this] { return is_stopped_ || vacancies_ > 0; });
+      if (is_wakeful_ && !is_needed()) {
+        ++awake_;
+        lock.unlock();
+        wait_briefly([this] { return is_needed(); });
+        lock.lock();
+        --awake_;
+      }
+      work_.wait(lock, [this] { return is_needed(); });
       if (is_stopped_) return;
       --vacancies_;
       ++working_;
@@ -166,16 +194,21 @@ class ThreadPool::Crew {
     }
   }
 
+  bool is_needed() const { return is_stopped_ || vacancies_ > 0; }
+
   const pid_t process_ = getpid();
   const std::size_t available_ = available_threads();
   std::atomic<bool> is_busy_{false};
   std::vector<std::thread> workers_;  // changed only by the thread that has set `is_busy_`
-  std::mutex mutex_;                  // guards the members below
+  std::mutex mutex_;                  // guards changes of the members below
   std::condition_variable work_, done_;
   Batch* batch_ = nullptr;
-  std::size_t vacancies_ = 0;  // workers that may still join the batch
-  std::size_t working_ = 0;
-  bool is_stopped_ = false;
+  std::atomic<std::size_t> vacancies_{0};  // workers that may still join the batch
+  std::atomic<std::size_t> working_{0};
+  std::atomic<bool> is_stopped_{false};
+  std::size_t awake_ = 0;            // workers that wait actively
+  bool is_wakeful_ = false;          // whether workers do so when they have ended their work
+  SteadyClock::time_point ended_{};  // end of the last batch
 };
 
 ThreadPool::~ThreadPool() { stop(); }

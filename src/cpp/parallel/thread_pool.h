@@ -12,8 +12,9 @@ namespace flatland {
 // that the process may use, reduced to the quota of the control group.
 std::size_t available_threads();
 
-// A set of worker threads. The first call starts the threads, which then wait for the next call. A
-// pool without calls has no threads. Several threads may call `parallel_for` concurrently.
+// A set of worker threads. The first call starts the threads, which then wait for the next call:
+// actively for a short time if the calls follow each other closely, otherwise asleep. A pool
+// without calls has no threads. Several threads may call `parallel_for` concurrently.
 //
 // Jobs must not acquire the GIL: a thread that stops the pool may hold it.
 class ThreadPool {
