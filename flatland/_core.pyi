@@ -2210,6 +2210,29 @@ def connected_regions(mask: npt.ArrayLike, *, diagonally: bool) -> npt.NDArray[n
         ValueError: The mask has a wrong shape or type.
     """
 
+def are_connected(
+    mask: npt.ArrayLike,
+    start: tuple[int, int],
+    goal: tuple[int, int],
+    first: tuple[int, int],
+    last: tuple[int, int],
+) -> bool:
+    """Returns whether a path of on pixels connects two pixels within a rectangle of a mask.
+
+    Args:
+        mask: Pixels, shape (rows, columns), bool or uint8.
+        start: Row and column of a pixel; it belongs to the path.
+        goal: Row and column of another one.
+        first: First row and column of the rectangle.
+        last: Its last row and column.
+
+    Returns:
+        Whether there is a path from pixel to pixel, which may be diagonally adjacent.
+
+    Raises:
+        ValueError: The mask has a wrong shape or type, or a pixel is outside of it or the rectangle.
+    """
+
 def distances_to_off(mask: npt.ArrayLike) -> npt.NDArray[np.float32]:
     """Returns the distances between the centers of pixels and of the nearest off pixels.
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, Bounds, DoubleArray
-from flatland.physics import connected_regions, distances_to_off
+from flatland.physics import are_connected, connected_regions, distances_to_off
 
 IntArray = npt.NDArray[np.int64]
 
@@ -158,21 +158,25 @@ class FreeSpace:
         """
         # Without arrays, which take longer for two points.
         (x_min, x_max), (y_min, y_max) = sorted((start[0], goal[0])), sorted((start[1], goal[1]))
-        first_column = max(math.floor((x_min - margin - self._x) / self._cell), 0)
-        first_row = max(math.floor((y_min - margin - self._y) / self._cell), 0)
-        end_column = math.floor((x_max + margin - self._x) / self._cell) + 1
-        end_row = math.floor((y_max + margin - self._y) / self._cell) + 1
-        grid = self._regions.reshape(self._rows, self._columns)
-        window = grid[first_row:end_row, first_column:end_column] > 0
-        regions = connected_regions(window, diagonally=True)
-        ends = []
-        for x, y in (start, goal):
-            cell = self.cell_at(x, y)
-            if cell is None:
-                return False
-            row, column = divmod(cell, self._columns)
-            ends.append(int(regions[row - first_row, column - first_column]))
-        return ends[0] > 0 and ends[0] == ends[1]
+        cells = self.cell_at(*start), self.cell_at(*goal)
+        if cells[0] is None or cells[1] is None:
+            return False
+        first_column = math.floor((x_min - margin - self._x) / self._cell)
+        first_row = math.floor((y_min - margin - self._y) / self._cell)
+        last_column = math.floor((x_max + margin - self._x) / self._cell)
+        last_row = math.floor((y_max + margin - self._y) / self._cell)
+        return are_connected(
+            self._passable,
+            divmod(cells[0], self._columns),
+            divmod(cells[1], self._columns),
+            (max(first_row, 0), max(first_column, 0)),
+            (min(last_row, self._rows - 1), min(last_column, self._columns - 1)),
+        )
+
+    @functools.cached_property
+    def _passable(self) -> BoolArray:
+        """Whether the disc fits around the center of each cell, shape (rows, columns)."""
+        return self._regions.reshape(self._rows, self._columns) > 0
 
     def point_in(self, cell: int, u: float, v: float) -> tuple[float, float]:
         """Returns a point of a cell in the world frame [m].

@@ -28,6 +28,7 @@ from flatland.physics import (
     Run,
     RunEnd,
     ScanRequest,
+    are_connected,
     boundary_edges,
     boundary_loops,
     connected_regions,
@@ -615,6 +616,9 @@ class RandomCalls(ControllerCalls):
         regions = connected_regions(mask, diagonally=self.rng.random() < 0.5)
         for result in (grown, regions, distances_to_off(mask)):
             self._require(result.shape == mask.shape, "returns a wrong shape")
+        pixels = [(self.rng.randrange(-1, 20), self.rng.randrange(-1, 70)) for _ in range(4)]
+        if are_connected(mask, *pixels):
+            self._require(bool(mask[pixels[0]] and mask[pixels[1]]), "connects an off pixel")
 
     def do_close(self) -> None:
         old = self.world

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <iterator>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bindings/arrays.h"
@@ -70,6 +71,35 @@ py::array_t<std::int32_t> py_connected_regions(const py::array& mask, bool diago
       mask, [&](const Bitmap& bitmap) { return connected_regions(bitmap, diagonally); });
 }
 
+using IndexPair = std::pair<py::ssize_t, py::ssize_t>;  // row, column
+
+std::string text_of(Pixel pixel) {
+  return "(" + std::to_string(pixel.row) + ", " + std::to_string(pixel.col) + ")";
+}
+
+// Returns a pixel; throws a ValueError unless it is from `low` to `high`.
+Pixel checked_pixel(const char* name, const IndexPair& pixel, Pixel low, Pixel high) {
+  const auto [row, col] = pixel;
+  const Pixel found{static_cast<std::size_t>(row), static_cast<std::size_t>(col)};
+  const bool is_inside = row >= 0 && found.row >= low.row && found.row <= high.row && col >= 0 &&
+                         found.col >= low.col && found.col <= high.col;
+  if (is_inside) return found;
+  throw py::value_error(std::string(name) + " must be from " + text_of(low) + " to " +
+                        text_of(high) + ", got (" + std::to_string(row) + ", " +
+                        std::to_string(col) + ")");
+}
+
+bool py_are_connected(const py::array& mask, const IndexPair& start, const IndexPair& goal,
+                      const IndexPair& first, const IndexPair& last) {
+  const py::array pixels = checked_mask(mask);
+  const Bitmap bitmap = view_of(pixels);
+  if (bitmap.rows == 0 || bitmap.cols == 0) throw py::value_error("mask must not be empty");
+  const Pixel low = checked_pixel("first", first, {0, 0}, {bitmap.rows - 1, bitmap.cols - 1});
+  const Pixel high = checked_pixel("last", last, low, {bitmap.rows - 1, bitmap.cols - 1});
+  return are_connected(bitmap, checked_pixel("start", start, low, high),
+                       checked_pixel("goal", goal, low, high), low, high);
+}
+
 py::array_t<float> py_distances_to_off(const py::array& mask) {
   return of_each_pixel<float>(mask, distances_to_off);
 }
@@ -130,6 +160,23 @@ Returns:
 
 Raises:
     ValueError: The mask has a wrong shape or type.
+)");
+  module.def("are_connected", &py_are_connected, py::arg("mask"), py::arg("start"), py::arg("goal"),
+             py::arg("first"), py::arg("last"), R"(
+Returns whether a path of on pixels connects two pixels within a rectangle of a mask.
+
+Args:
+    mask: Pixels, shape (rows, columns), bool or uint8.
+    start: Row and column of a pixel; it belongs to the path.
+    goal: Row and column of another one.
+    first: First row and column of the rectangle.
+    last: Its last row and column.
+
+Returns:
+    Whether there is a path from pixel to pixel, which may be diagonally adjacent.
+
+Raises:
+    ValueError: The mask has a wrong shape or type, or a pixel is outside of it or the rectangle.
 )");
   module.def("distances_to_off", &py_distances_to_off, py::arg("mask"), R"(
 Returns the distances between the centers of pixels and of the nearest off pixels.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <tuple>
 #include <utility>
@@ -178,6 +179,40 @@ std::vector<std::int32_t> connected_regions(const Bitmap& bitmap, bool diagonall
   const std::vector<std::int32_t> numbers = regions.numbers();
   for (std::int32_t& label : labels) label = numbers[static_cast<std::size_t>(label)];
   return labels;
+}
+
+namespace {
+
+// Returns whether all pixels of a line between two pixels are on.
+bool is_line_on(const Bitmap& bitmap, Pixel a, Pixel b) {
+  const auto rows = static_cast<std::int64_t>(b.row) - static_cast<std::int64_t>(a.row);
+  const auto cols = static_cast<std::int64_t>(b.col) - static_cast<std::int64_t>(a.col);
+  const std::int64_t n = std::max<std::int64_t>({std::abs(rows), std::abs(cols), 1});
+  for (std::int64_t i = 0; i <= n; ++i) {
+    const std::size_t row = a.row + static_cast<std::size_t>(rows * i / n);
+    const std::size_t col = a.col + static_cast<std::size_t>(cols * i / n);
+    if (bitmap.pixels[row * bitmap.cols + col] == 0) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool are_connected(const Bitmap& bitmap, Pixel a, Pixel b, Pixel low, Pixel high) {
+  // The straight line is the usual path, and much faster to examine than the whole window.
+  if (is_line_on(bitmap, a, b)) return true;
+  const std::size_t cols = high.col - low.col + 1;
+  std::vector<std::uint8_t> pixels;
+  for (std::size_t row = low.row; row <= high.row; ++row) {
+    const std::uint8_t* first = bitmap.pixels + row * bitmap.cols + low.col;
+    pixels.insert(pixels.end(), first, first + cols);
+  }
+  const Bitmap window{pixels.data(), high.row - low.row + 1, cols};
+  const std::vector<std::int32_t> regions = connected_regions(window, true);
+  const auto region_of = [&](Pixel pixel) {
+    return regions[(pixel.row - low.row) * cols + pixel.col - low.col];
+  };
+  return region_of(a) != 0 && region_of(a) == region_of(b);
 }
 
 namespace {

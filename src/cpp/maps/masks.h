@@ -25,6 +25,15 @@ std::vector<std::uint8_t> dilated(const Bitmap& bitmap, const std::vector<ShapeR
 // adjacent pixels are connected, blocks of 2 x 2 pixels take the place of pixels in this order.
 std::vector<std::int32_t> connected_regions(const Bitmap& bitmap, bool diagonally);
 
+// A pixel of a bitmap.
+struct Pixel {
+  std::size_t row, col;
+};
+
+// Returns whether a path of on pixels, which may be diagonally adjacent, connects two on pixels
+// within the rows and columns from `low` to `high`, both of which are included.
+bool are_connected(const Bitmap& bitmap, Pixel a, Pixel b, Pixel low, Pixel high);
+
 // Returns the distance from the centre of each pixel to that of the nearest off pixel [pixels];
 // infinite if all pixels are on.
 std::vector<float> distances_to_off(const Bitmap& bitmap);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from flatland.physics import (
+    are_connected,
     boundary_loops,
     connected_regions,
     dilated,
@@ -67,6 +69,43 @@ def naive_regions(mask: Bits, diagonally: bool) -> npt.NDArray[np.int32]:
 def test_connected_regions(mask: Bits, diagonally: bool) -> None:
     regions = connected_regions(mask, diagonally=diagonally)
     np.testing.assert_array_equal(regions, naive_regions(mask, diagonally))
+
+
+@FEW
+@given(arrays(np.bool_, st.tuples(*[st.integers(1, 9)] * 2), fill=st.just(True)), st.data())
+def test_connected_pixels(mask: Bits, data: st.DataObject) -> None:
+    """All pairs of pixels of a window, by the regions of the window alone."""
+    first = tuple(data.draw(st.integers(0, size - 1)) for size in mask.shape)
+    last = tuple(
+        data.draw(st.integers(low, size - 1)) for low, size in zip(first, mask.shape, strict=True)
+    )
+    regions = np.zeros(mask.shape, np.int32)
+    window = tuple(slice(low, high + 1) for low, high in zip(first, last, strict=True))
+    regions[window] = naive_regions(mask[window], diagonally=True)
+    pixels = list(itertools.product(*(range(each.start, each.stop) for each in window)))
+    for start, goal in itertools.product(pixels, repeat=2):
+        expected = regions[start] > 0 and regions[start] == regions[goal]
+        assert are_connected(mask, start, goal, first, last) == expected
+
+
+@pytest.mark.parametrize(
+    ("pixels", "message"),
+    [
+        (((0, 0), (0, 0), (0, 0), (3, 4)), r"last must be from \(0, 0\) to \(2, 4\), got \(3, 4\)"),
+        (((0, 0), (0, 0), (-1, 0), (2, 4)), r"first must be from \(0, 0\) to .*, got \(-1, 0\)"),
+        (((2, 2), (2, 2), (2, 2), (1, 4)), r"last must be from \(2, 2\) to .*, got \(1, 4\)"),
+        (((1, 0), (1, 1), (1, 1), (2, 4)), r"start must be from \(1, 1\) to .*, got \(1, 0\)"),
+        (((1, 1), (2, 4), (1, 1), (2, 3)), r"goal must be from \(1, 1\) to .*, got \(2, 4\)"),
+    ],
+)
+def test_pixels_outside_of_the_window(pixels: tuple[tuple[int, int], ...], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        are_connected(np.ones((3, 5), bool), *pixels)
+
+
+def test_no_pixels_are_connected_in_an_empty_mask() -> None:
+    with pytest.raises(ValueError, match="mask must not be empty"):
+        are_connected(np.ones((0, 5), bool), (0, 0), (0, 0), (0, 0), (0, 0))
 
 
 @FEW
