@@ -1,5 +1,6 @@
 #include "world/free_motion.h"
 
+#include <box2d/b2_circle_shape.h>
 #include <box2d/b2_contact.h>
 #include <box2d/b2_fixture.h>
 #include <box2d/b2_settings.h>
@@ -92,6 +93,22 @@ bool keeps_box(const b2AABB& kept, const b2AABB& box, b2Vec2 displacement) {
   return largest.Contains(kept);
 }
 
+// Returns the box of a shape. That of a circle, as many robots and all people are, does not need
+// the call of a library.
+b2AABB box_of(const b2Shape& shape, const b2Transform& transform, int32 child) {
+  b2AABB box;
+  if (shape.GetType() == b2Shape::e_circle) {
+    const auto& circle = static_cast<const b2CircleShape&>(shape);
+    const b2Vec2 center = transform.p + b2Mul(transform.q, circle.m_p);
+    const b2Vec2 radius(circle.m_radius, circle.m_radius);
+    box.lowerBound = center - radius;
+    box.upperBound = center + radius;
+  } else {
+    shape.ComputeAABB(&box, transform, child);
+  }
+  return box;
+}
+
 // Computes the boxes that the fixtures sweep. Returns false if there are too many.
 bool sweep_boxes(b2Body& body, const b2BroadPhase& broad_phase, const b2Transform& from,
                  Move& move) {
@@ -99,10 +116,8 @@ bool sweep_boxes(b2Body& body, const b2BroadPhase& broad_phase, const b2Transfor
   for (b2Fixture* f = body.GetFixtureList(); f != nullptr; f = f->GetNext()) {
     if (move.count == kMostFixtures || get<members::FixtureProxyCount>(*f) != 1) return false;
     b2FixtureProxy* proxy = get<members::FixtureProxies>(*f);
-    b2AABB before;
-    b2AABB after;
-    f->GetShape()->ComputeAABB(&before, from, proxy->childIndex);
-    f->GetShape()->ComputeAABB(&after, move.to, proxy->childIndex);
+    const b2AABB before = box_of(*f->GetShape(), from, proxy->childIndex);
+    const b2AABB after = box_of(*f->GetShape(), move.to, proxy->childIndex);
     MovedBox& each = move.boxes[move.count++];
     each.proxy = proxy;
     each.box.Combine(before, after);
