@@ -38,3 +38,11 @@ def test_random_numbers_of_the_core(tmp_path: Path) -> None:
     source = Path(__file__).with_name("random_kernel_test.cpp")
     program = compile_program(tmp_path / "random_kernel_test", [source], flags)
     run_program([program], check=True)
+
+
+def test_search_for_new_pairs(tmp_path: Path) -> None:
+    """The same contacts as Box2D finds, in the same order."""
+    sources = [Path(__file__).with_name("broad_phase_test.cpp"), CORE / "world/broad_phase.cpp"]
+    flags = [*STANDARD, "-O1", "-DB2_SHARED"]
+    program = compile_program(tmp_path / "broad_phase_test", sources, flags, ["-lbox2d"])
+    run_program([program], check=True)

@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "world/broad_phase.h"
 #include "world/errors.h"
 #include "world/shapes.h"
 
@@ -197,16 +196,11 @@ std::size_t create_edges(World& world, Id body_id, const float* edges, std::size
   const b2FixtureDef definition = checked_definition(shape, options);
   auto* body = const_cast<b2Body*>(world.read_body(body_id));
   world.reserve_fixtures(count);
-  const int32 pending_before = pending_fixtures(world.engine());
   std::size_t made = 0;
   for (std::size_t i = 0; i < count; ++i) {
     if (!make_edge(edges + 4 * i, &shape)) continue;
     world.add_fixture(body, definition);
     ++made;
-  }
-  constexpr std::size_t kManyEdges = 10000;
-  if (made >= kManyEdges && body->GetType() == b2_staticBody) {
-    world.skip_static_fixtures(pending_before);
   }
   if (made > 0) wake(world, body);
   return made;

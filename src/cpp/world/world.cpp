@@ -122,6 +122,7 @@ StepReport World::step_unchecked(double dt, int velocity_iterations, int positio
       hook == nullptr && free_motion_.begin(*engine_, seconds, position_iterations);
   if (!is_done) {
     walls_.create(*engine_, seconds);
+    begin_step(*engine_);
     engine_->Step(seconds, velocity_iterations, position_iterations);
     walls_.create(*engine_, 0.0F);
     // The guard restores the pose of a static body that has overflowed, with its fixtures.
@@ -333,10 +334,6 @@ Id World::add_fixture(b2Body* body, const b2FixtureDef& definition) {
   return id;
 }
 
-void World::skip_static_fixtures(int32 pending_before) {
-  flatland::skip_static_fixtures(*engine_, pending_before);
-}
-
 Id World::add_joint(const b2JointDef& definition, float frequency, float damping_ratio) {
   check_changeable();
   structure_changed();
@@ -351,7 +348,7 @@ Id World::add_joint(const b2JointDef& definition, float frequency, float damping
 void World::find_new_contacts() {
   check_changeable();
   walls_.create(*engine_, 0.0F);
-  const_cast<b2ContactManager&>(engine_->GetContactManager()).FindNewContacts();
+  find_new_pairs(*engine_);
 }
 
 void World::share_walls() {
@@ -378,9 +375,9 @@ void World::destroy_body(Id id) {
   structure_changed();
   // For each destroyed fixture, Box2D searches the list of all fixtures that were created or moved
   // since the last search for new pairs. For a large map that is destroyed before the first step
-  // this would take hours. FindNewContacts clears the list.
-  constexpr int32 kManyFixtures = 2000;
-  if (pending_fixtures(*engine_) > kManyFixtures) find_new_contacts();
+  // this would take hours. The search clears the list.
+  constexpr int32 kMany = 2000;
+  if (pending_fixtures(*engine_) > kMany) find_new_contacts();
   rays_.remove_body(body);
   engine_->DestroyBody(body);  // calls SayGoodbye for its fixtures and joints
   bodies_.erase(id);

@@ -149,9 +149,8 @@ class World final : private b2DestructionListener {
   // fixtures and joints.
   Id add_body(const b2BodyDef& definition);
   Id add_fixture(b2Body* body, const b2FixtureDef& definition);
-  // To be called before and after adding many fixtures to one static body; see broad_phase.h.
+  // To be called before adding many fixtures.
   void reserve_fixtures(std::size_t more) { fixtures_.reserve(more); }
-  void skip_static_fixtures(int32 pending_before);
   // Searches for pairs of fixtures that may touch, which the next step would do otherwise.
   void find_new_contacts();
   // Replaces the fixtures of static bodies that have only edges by walls that all copies of this
