@@ -22,7 +22,7 @@ from flatland.node.parameters import (
 )
 from flatland.node.run import NodeRun
 from flatland.ros.message_types import select_package
-from flatland.ros.rospy_import import defer_catkin
+from flatland.ros.rospy_import import defer_catkin, shorten_registration
 
 if TYPE_CHECKING:
     from flatland.ros.transport.registrar import Registrar
@@ -106,6 +106,7 @@ class ServerNode:
         from flatland.ros.transport import inbound
 
         inbound.install()
+        shorten_registration()
         try:
             # Without rostime, rospy does not subscribe to `/clock`; the bridge sets its time.
             rospy.init_node(NODE_NAME, disable_signals=True, disable_rostime=True)

@@ -1,13 +1,15 @@
-"""A shorter import of rospy."""
+"""A shorter import and start of rospy."""
 
 from __future__ import annotations
 
 import importlib
 import sys
+import time
 import types
 from typing import Any, Final
 
 _CATKIN: Final = "catkin.find_in_workspaces"
+_REGISTRATION_POLL_PERIOD: Final = 0.002  # s
 
 
 def defer_catkin() -> None:
@@ -27,3 +29,17 @@ def defer_catkin() -> None:
 
     placeholder.find_in_workspaces = find_in_workspaces
     sys.modules[_CATKIN] = placeholder
+
+
+def shorten_registration() -> None:
+    """Makes `rospy.init_node` return soon after the registration of the node.
+
+    rospy checks whether the node is registered with the master immediately, which is too early, and
+    then every 0.1 s.
+    """
+    import rospy.impl.init
+
+    def sleep(seconds: float) -> None:
+        time.sleep(min(seconds, _REGISTRATION_POLL_PERIOD))
+
+    rospy.impl.init.time = types.SimpleNamespace(sleep=sleep)
