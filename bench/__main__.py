@@ -15,6 +15,7 @@ from pathlib import Path
 
 from curves import plot
 from scans import time_unit
+from scenes import BAR_WORLD, benchmark_world_path
 from table import as_json, format_table
 
 GROWTH = "growth"  # the module that measures curves
@@ -69,7 +70,10 @@ def main() -> None:
         earlier = json.loads(options.baseline.read_text())
         baseline = {row["name"]: row["value"] for row in earlier["rows"]}
     unit = time_unit()
-    print(f"U = {unit * 1e3:.3f} ms\n")
+    world = benchmark_world_path().parent.name
+    print(f"U = {unit * 1e3:.3f} ms, in {world}\n")
+    if world != BAR_WORLD:
+        print(f"The bars in U are for {BAR_WORLD}: set FLATLAND_SHARED_DIR.\n")
     rows = []
     for name in MODULES:
         if name in options.only:

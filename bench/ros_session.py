@@ -156,6 +156,8 @@ def _environment(folder: Path) -> dict[str, str]:
         "PYTHONUNBUFFERED": "1",
     }
     environment.pop("ROS_HOSTNAME", None)
+    # A start includes no compilation, as usual from the second one on.
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     package = Path(flatland.__file__).resolve().parent.parent
     if (package / "launch").is_dir():
         # flatland was imported from a source tree, which gets the layout of an installation.

@@ -14,6 +14,7 @@ from flatland.physics import PhysicsWorld
 CHECKOUT = Path(__file__).resolve().parent.parent
 BEAMS = 1081
 RANGE = 20.0
+BAR_WORLD = "benchmark_world"  # of the reference simulator; a scan in the office takes less time
 
 
 def shared_dir() -> Path | None:
@@ -27,7 +28,7 @@ def benchmark_world_path() -> Path:
     shared = shared_dir()
     if shared is None:
         return CHECKOUT / "worlds" / "office" / "world.yaml"
-    return shared / "worlds" / "benchmark_world" / "world.yaml"
+    return shared / "worlds" / BAR_WORLD / "world.yaml"
 
 
 def scan_pose(world: flatland.World) -> tuple[float, float, float]:
