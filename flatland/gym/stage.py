@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import importlib
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -82,7 +83,7 @@ class Stage:
             check_live_view(web_port)
         self.metadata = {**metadata, "render_fps": round(1 / settings.dt) or 1}
         self._render_mode = render_mode
-        with ExitStack() as undo:
+        with _paused_collector(), ExitStack() as undo:
             self._stocks: list[Stock] = []
             for building in range(settings.building_count):
                 original = undo.enter_context(settings.load(building))
@@ -224,6 +225,18 @@ class Stage:
                 closing.callback(world.close)
             self._view.close()
             self.episodes.close()
+
+
+@contextmanager
+def _paused_collector() -> Iterator[None]:
+    """Pauses the collector of garbage, which would examine all worlds again and again."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 def _check_memory(count: int, buildings: int, size: int) -> None:

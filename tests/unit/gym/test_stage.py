@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Iterator
 from typing import Any, NoReturn
 
 import pytest
@@ -47,6 +48,36 @@ def test_a_failed_environment_leaves_no_world(
         FlatlandVectorEnv(3)
     assert created
     assert all(world.closed for world in created)
+
+
+@pytest.fixture
+def collector() -> Iterator[None]:
+    """Restores the state of the collector of garbage."""
+    yield
+    gc.enable()
+
+
+@pytest.mark.usefixtures("collector")
+@pytest.mark.parametrize("is_enabled", [True, False])
+def test_the_collector_is_paused_while_worlds_are_copied(
+    make: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, is_enabled: bool
+) -> None:
+    """It would examine all of them again and again."""
+    clone = World.clone
+    seen = []
+
+    def observed_clone(self: World) -> World:
+        seen.append(gc.isenabled())
+        return clone(self) if len(seen) < 3 else fail()
+
+    monkeypatch.setattr(World, "clone", observed_clone)
+    (gc.enable if is_enabled else gc.disable)()
+    make(FlatlandVectorEnv, 2)
+    assert gc.isenabled() == is_enabled
+    with pytest.raises(BrokenError):
+        make(FlatlandVectorEnv, 4)
+    assert gc.isenabled() == is_enabled
+    assert seen == [False] * 3
 
 
 def test_a_failed_clone_leaves_no_world(
