@@ -2006,7 +2006,7 @@ class AgentRows:
         """
 
 class AgentBatch:
-    """Driven bodies with range finders, each in a world of its own, which advance in parallel."""
+    """Driven bodies with range finders, in worlds that advance in parallel."""
     def __init__(
         self, agents: Sequence[tuple[PhysicsBody, Controller, Touches, RangeFinder]]
     ) -> None:
@@ -2017,13 +2017,14 @@ class AgentBatch:
                 and a range finder.
 
         Raises:
-            ValueError: Two agents have the same world, their numbers of readings differ, or a range finder
-                measures intensities.
+            ValueError: The agents of a world are not neighbours, two agents have the same body, their
+                numbers of readings differ, or a range finder measures intensities.
         """
     def replace(
         self, row: int, agent: tuple[PhysicsBody, Controller, Touches, RangeFinder]
     ) -> None:
-        """Replaces an agent by one of another world, which has no permission.
+        """Replaces an agent by one of another world, which has no permission. All agents of a world must be
+        replaced before `start`.
 
         Args:
             row: Index of the agent.
@@ -2054,11 +2055,11 @@ class AgentBatch:
         Raises:
             IndexError: There is no such agent.
         """
-    def not_permitted(self, steps: npt.ArrayLike) -> list[int]:
+    def not_permitted(self, acts: npt.ArrayLike) -> list[int]:
         """Returns the agents without a permission.
 
         Args:
-            steps: Agents that are examined, shape (n,).
+            acts: Agents that are examined, shape (n,).
 
         Raises:
             ValueError: The array has another shape.
@@ -2066,7 +2067,7 @@ class AgentBatch:
     def start(
         self,
         run: tuple[int, int, int, float, int, int, bool, bool],
-        steps: npt.ArrayLike,
+        acts: npt.ArrayLike,
         observes: npt.ArrayLike,
         velocities: npt.ArrayLike,
         noises: npt.ArrayLike,
@@ -2080,14 +2081,14 @@ class AgentBatch:
         """Sets the commands of agents, and begins to step their worlds and to observe them.
 
         Other threads do this until `finish`. Meanwhile these worlds and the arrays must not be used, except
-        for the rows of agents that neither step nor are observed. All arrays are C-contiguous, with a row for each agent. The results do not depend on the number of
-        threads.
+        for the rows of agents that neither act nor are observed. All arrays are C-contiguous, with a row for
+        each agent. The results do not depend on the number of threads.
 
         Args:
             run: The steps, as `Run`; each world has a time of its own, which it advances if the steps are
                 complete.
-            steps: Whether the world of the agent steps, shape (n,).
-            observes: Whether the agent is observed, after its steps, shape (n,).
+            acts: Whether the agent has a command, and its world steps, shape (n,).
+            observes: Whether the agent is observed, after the steps of its world, shape (n,).
             velocities: Commands (forward, sideways, omega), or (speed, 0, steering angle) for a drive that is
                 steered [m/s, rad/s, rad], shape (n, 3).
             noises: Stream and number of the update of each scan, shape (n, 2).
@@ -2095,7 +2096,7 @@ class AgentBatch:
             pose_rates: Receives the velocities of their origins (vx, vy, omega), shape (n, 3).
             sensor_poses: Receives the poses of the range finders in the world frame, shape (n, 3).
             ranges: Receives the readings [m], shape (n, readings), float32.
-            touched: Receives whether an agent touched anything in its steps, shape (n,).
+            touched: Receives whether an agent that acts touched anything in the steps, shape (n,).
             num_threads: Maximum number of threads; 0 for one per core.
 
         Raises:
@@ -2104,7 +2105,7 @@ class AgentBatch:
             WorldLockedError: A world is in use.
         """
     def observe(self, rows: Sequence[int]) -> None:
-        """Observes agents between `start` and `finish` that neither step nor are observed by these.
+        """Observes agents between `start` and `finish` whose worlds these do not concern.
 
         Args:
             rows: Indices of the agents.
@@ -2126,8 +2127,8 @@ class AgentBatch:
         """Completes what `start` has begun.
 
         Returns:
-            Agents whose steps are not complete, with what `JobQueue.run` returns or raises. They are not
-            observed.
+            The first agents of worlds whose steps are not complete, with what `JobQueue.run` returns or
+            raises. No agents of these worlds are observed.
 
         Raises:
             ValueError: `start` was not called.

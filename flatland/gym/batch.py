@@ -1,8 +1,8 @@
-"""The agents of an environment with a world for each agent, stepped and scanned by the core."""
+"""The agents of many worlds, stepped and scanned by the core."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,18 +25,18 @@ _NO_ROWS = np.empty(0, np.intp)
 
 
 class Batch:
-    """Performs a step of an environment in one call of the core, for all agents that permit it.
+    """Performs a step of an environment in one call of the core, for all worlds that permit it.
 
-    An agent is excluded from a step while something observes its world or waits for its next step,
-    such as a request of a viewer or a plugin that was just reset. Its results are the same then.
+    A world is excluded from a step while something observes it or waits for its next step, such as
+    a request of a viewer or a plugin that was just reset. The results are the same then.
     """
 
     def __init__(self, agents: Sequence[Agent], situation: Situation, num_threads: int) -> None:
         """Prepares the agents.
 
         Args:
-            agents: The agents, for which `is_possible` is true. If elements are replaced,
-                `agent_changed` must be called.
+            agents: The agents, for which `is_possible` is true; each world has the same number of
+                neighbours. If elements are replaced, `agent_changed` must be called.
             situation: Receives what the agents observe.
             num_threads: Number of threads that step and scan, 0 for one per core.
         """
@@ -48,6 +48,7 @@ class Batch:
         # One thread at a time uses the worlds, and holds the lock of all of them.
         self._requests = agents[0].world.requests
         self._all = np.ones(n, np.bool_)
+        self._team_size = n // len({id(agent.world) for agent in agents})
         self._commands = np.zeros((n, 3))
         self._counts = np.zeros(n, np.int64)  # of commands of each agent
         self._noises = np.zeros((n, 2), np.uint64)  # see `Laser.next_computed`
@@ -80,8 +81,7 @@ class Batch:
             high: Highest command.
         """
         return (
-            len({id(agent.world) for agent in agents}) == len(agents)
-            and all(agent.controller is not None for agent in agents)
+            all(agent.controller is not None for agent in agents)
             and not any(agent.laser.measures_intensities for agent in agents)
             and bool((np.abs([low, high]) <= MAX_COMMAND).all())
         )
@@ -90,18 +90,21 @@ class Batch:
         self,
         commands: DoubleArray,
         acting: BoolArray | None,
+        observed: BoolArray | None,
         n: int,
         meanwhile: Callable[[], object],
     ) -> Rows:
-        """Carries out commands for some steps of the worlds, and observes all agents.
+        """Carries out commands for some steps of the worlds, and observes agents.
 
         Args:
             commands: Forward and sideways velocity and yaw rate of each agent, or speed, 0 and
                 steering angle [m/s, rad/s, rad], shape (n, 3).
-            acting: Agents that act, shape (n,); None for all. The worlds of others are not stepped.
+            acting: Agents that act, shape (n,); None for all. Worlds in which no agent acts are not
+                stepped.
+            observed: Agents that are observed, shape (n,); None for all.
             n: Number of steps.
-            meanwhile: Called while other threads step; it may change the worlds of agents that do
-                not act, and replace these agents. They are observed afterwards.
+            meanwhile: Called while other threads step; it may change the worlds in which no agent
+                acts, and replace their agents. They are observed afterwards.
 
         Returns:
             The agents that remain to be observed.
@@ -109,45 +112,87 @@ class Batch:
         Raises:
             Exception: As `World.step`, or raised by `meanwhile`.
         """
+        acting = self._all if acting is None else acting
+        observed = self._all if observed is None else observed
         # Code of a plugin that calls this holds the lock already.
         is_free = not self._requests.lock.is_owned
         with self._requests.lock:
-            others = [
-                row
-                for row in self._core.not_permitted(self._all if acting is None else acting)
-                if not (is_free and self._permit(row))
-            ]
-            alone = self._all if acting is None else acting
-            if others:
-                alone = alone.copy()
-                alone[others] = False
-            self._start(commands, alone, alone, n)
+            refused = self._not_permitted(acting, is_free)
+            alone, observes = acting, observed
+            standing = self._standing(acting)
+            if standing is not None:
+                observes = observes & ~standing
+            if refused:
+                permitted = np.ones(len(acting), np.bool_)
+                permitted[refused] = False
+                alone, observes = alone & permitted, observes & permitted
+            self._start(commands, alone, observes, n)
             idle: list[int] = []
             try:
                 meanwhile()
-                if acting is not None:
-                    standing = ~acting
-                    idle = self._observe_beside(standing.nonzero()[0].tolist())
+                if standing is not None:
+                    idle = self._observe_beside((standing & observed).nonzero()[0].tolist())
                     # For the next call, since this one waits for the other threads in any case.
-                    for row in self._core.not_permitted(standing) if is_free else ():
-                        self._permit(row)
+                    if is_free:
+                        self._not_permitted(standing, True)
             finally:
-                unfinished = self._finish(alone)
+                unfinished = self._finish(observes)
                 if alone is self._all:
                     self._commands[:] = commands
                 else:
                     self._commands[alone] = commands[alone]
                 self._counts += alone
                 self._complete(unfinished, n)
-        if others:
-            agents = [self._agents[row] for row in others]
-            step_agents(agents, commands[others], n, self._num_threads)
-        for row in (*others, *unfinished):
-            self._situation.collided[row] = self._agents[row].touches.touched
-        return self._observe([*unfinished, *idle], others)
+        if refused:
+            rows = [row for row in refused if acting[row]]
+            step_agents([self._agents[row] for row in rows], commands[rows], n, self._num_threads)
+        incomplete = self._teams(unfinished)
+        for row in (*refused, *incomplete):
+            if acting[row]:
+                self._situation.collided[row] = self._agents[row].touches.touched
+        left = [row for row in (*incomplete, *idle) if observed[row]]
+        return self._observe(left, [row for row in refused if observed[row]])
+
+    def _team(self, row: int) -> range:
+        """Returns the agents of the world of an agent."""
+        first = row - row % self._team_size
+        return range(first, first + self._team_size)
+
+    def _teams(self, rows: Iterable[int]) -> list[int]:
+        """Returns all agents of some worlds, each of which is given by one agent."""
+        return [each for row in rows for each in self._team(row)]
+
+    def _standing(self, acting: BoolArray) -> BoolArray | None:
+        """Returns the agents of the worlds in which no agent acts, shape (n,); None for none."""
+        if acting is self._all:
+            return None
+        standing = ~acting
+        if self._team_size == 1:
+            return standing
+        return np.repeat(standing.reshape(-1, self._team_size).all(axis=1), self._team_size)
+
+    def _not_permitted(self, acting: BoolArray, is_free: bool) -> list[int]:
+        """Permits the core to step worlds alone, where this is possible.
+
+        Args:
+            acting: Agents whose worlds are to step, shape (n,).
+            is_free: Whether the caller may permit anything.
+
+        Returns:
+            All agents of the worlds that have no permission.
+        """
+        refused: list[int] = []
+        examined = range(0)
+        for row in self._core.not_permitted(acting):
+            if row in examined:
+                continue
+            examined = self._team(row)
+            if not (is_free and self._permit(examined)):
+                refused.extend(examined)
+        return refused
 
     def _observe_beside(self, rows: list[int]) -> list[int]:
-        """Observes agents that do not act, while others step; returns those that remain."""
+        """Observes agents of other worlds, while these step; returns those that remain."""
         agents = self._agents
         chosen = [row for row in rows if not agents[row].world.physics.has_materials]
         noisy = [row for row in chosen if row in self._noisy]
@@ -165,36 +210,40 @@ class Batch:
         agents = self._agents
         chosen = [row for row in rows if not agents[row].world.physics.has_materials]
         if chosen:
-            steps, observes = np.zeros((2, len(agents)), np.bool_)
+            acts, observes = np.zeros((2, len(agents)), np.bool_)
             observes[chosen] = True
-            self._start(self._commands, steps, observes, 0)
+            self._start(self._commands, acts, observes, 0)
             for error in self._finish(observes).values():
                 if isinstance(error, Exception):
                     raise error
         return np.array(sorted({*rows, *others} - set(chosen)), np.intp)
 
-    def _permit(self, row: int) -> bool:
-        """Permits the core to step the world of an agent alone, if this is possible."""
-        agent, first = self._agents[row], self._agents[0].world
-        world = agent.world
-        agent.command.settle()
-        self._core.permit(row)
+    def _permit(self, rows: range) -> bool:
+        """Permits the core to step the world of some agents alone, if this is possible."""
+        team, first = [self._agents[row] for row in rows], self._agents[0].world
+        world = team[0].world
+        for agent in team:
+            agent.command.settle()
+        for row in rows:
+            self._core.permit(row)
         if (
-            agent.command.on_set is None
+            all(agent.command.on_set is None for agent in team)
             and world.velocity_iterations == first.velocity_iterations
             and world.position_iterations == first.position_iterations
             and not world.physics.has_materials
             and world.stepping.prepare_unattended()
         ):
-            twist = agent.command.value
-            self._commands[row] = twist.linear_x, twist.linear_y, twist.angular_z
-            agent.command.follow(_Commands(self._commands, self._counts, row, world))
-            agent.laser.last_scan = None
+            for row, agent in zip(rows, team, strict=True):
+                twist = agent.command.value
+                self._commands[row] = twist.linear_x, twist.linear_y, twist.angular_z
+                agent.command.follow(_Commands(self._commands, self._counts, row, world))
+                agent.laser.last_scan = None
             return True
-        self._core.withdraw(row)
+        for row in rows:
+            self._core.withdraw(row)
         return False
 
-    def _start(self, commands: DoubleArray, steps: BoolArray, observes: BoolArray, n: int) -> None:
+    def _start(self, commands: DoubleArray, acts: BoolArray, observes: BoolArray, n: int) -> None:
         """Begins to carry out commands by n steps, and to observe agents."""
         agents, s = self._agents, self._situation
         world, timekeeper = agents[0].world, agents[0].world.timekeeper
@@ -211,7 +260,7 @@ class Batch:
                 False,
                 False,
             ),
-            steps,
+            acts,
             observes,
             np.ascontiguousarray(commands),
             self._noises,
@@ -224,10 +273,11 @@ class Batch:
         )
 
     def _finish(self, observes: BoolArray) -> dict[int, RunResult | Exception]:
-        """Completes what was begun; returns the rows with steps that remain."""
+        """Completes what was begun; returns the worlds with steps that remain, by an agent."""
         unfinished = dict(self._core.finish())
+        incomplete = set(self._teams(unfinished))
         for row in self._noisy:
-            if observes[row] and row not in unfinished:
+            if observes[row] and row not in incomplete:
                 self._agents[row].laser.count_computed()
         return unfinished
 
@@ -235,7 +285,8 @@ class Batch:
         """Completes n steps of worlds; raises the exception of the first one that fails."""
         error: BaseException | None = None
         for row, result in unfinished.items():
-            self._core.withdraw(row)
+            for each in self._team(row):
+                self._core.withdraw(each)
             try:
                 self._agents[row].world.stepping.continue_unattended(n, result)
             except BaseException as raised:

@@ -221,12 +221,16 @@ class Episodes:
             s.collided[chosen] = [agent.touches.touched for agent in agents]
             self.look(observed)
             return
-        acting = None
-        if rows is not None:
-            acting = np.zeros(len(s), np.bool_)
-            acting[rows] = True
-        self._measure(self._batch.perform(commands, acting, n, meanwhile))
-        self._observe()
+        acting, seen = self._mask_of(rows), self._mask_of(observed)
+        self._measure(self._batch.perform(commands, acting, seen, n, meanwhile))
+        self._observe(observed)
+
+    def _mask_of(self, rows: Rows | None) -> BoolArray | None:
+        if rows is None:
+            return None
+        mask = np.zeros(len(self._all), np.bool_)
+        mask[rows] = True
+        return mask
 
     def look(self, rows: Rows | None = None) -> None:
         """Performs scans and computes the observations.
@@ -234,20 +238,8 @@ class Episodes:
         Args:
             rows: Agents whose observations are computed; None for all.
         """
-        s = self.situation
-        if rows is None:
-            self._measure(self._all)
-            self._observe()
-            return
-        self._measure(rows)
-        self.randomization.change_scans(s, rows)
-        part = s.take(rows)
-        part.locate(self.goal_radius)
-        observations = self._present[rows]
-        self.layout.write(part, observations)
-        self._present[rows] = observations
-        s.put(rows, part)
-        self.observations = self.randomization.change_observations(self._present, s, rows)
+        self._measure(self._all if rows is None else rows)
+        self._observe(rows)
 
     def _measure(self, rows: Rows) -> None:
         """Reads poses and velocities of some agents, and performs scans."""
@@ -265,14 +257,23 @@ class Episodes:
         compute_scans(lasers, ranges, self._num_threads)
         s.ranges[rows] = ranges
 
-    def _observe(self) -> None:
-        """Computes the observations of all agents."""
-        self.randomization.change_scans(self.situation, self._all)
-        self.situation.locate(self.goal_radius)
-        self.layout.write(self.situation, self._present)
-        self.observations = self.randomization.change_observations(
-            self._present, self.situation, self._all
-        )
+    def _observe(self, rows: Rows | None) -> None:
+        """Computes the observations of some agents; None for all."""
+        s = self.situation
+        if rows is None:
+            self.randomization.change_scans(s, self._all)
+            s.locate(self.goal_radius)
+            self.layout.write(s, self._present)
+        else:
+            self.randomization.change_scans(s, rows)
+            part = s.take(rows)
+            part.locate(self.goal_radius)
+            observations = self._present[rows]
+            self.layout.write(part, observations)
+            self._present[rows] = observations
+            s.put(rows, part)
+        chosen = self._all if rows is None else rows
+        self.observations = self.randomization.change_observations(self._present, s, chosen)
 
     def judge(self) -> tuple[DoubleArray, BoolArray, BoolArray]:
         """Returns rewards, which episodes terminated and which were truncated, (n,) each."""

@@ -166,12 +166,14 @@ class FleetVectorEnv(StagedVector):
                 f"all episodes of world {over[0]} have ended: call reset() with "
                 'options={"reset_mask": ...} before step()'
             )
-        active = self._is_running.copy()
-        self._begin(over)  # Only in the mode NEXT_STEP are there any.
+        active, running = self._is_running.copy(), self._is_running.copy()
+        # Only in the mode NEXT_STEP are there any.
+        running.reshape(self.num_worlds, self.num_robots)[over] = True
         self._episodes.step(
             numbers,
             None if active.all() else np.flatnonzero(active),
-            None if self._is_running.all() else np.flatnonzero(self._is_running),
+            None if running.all() else np.flatnonzero(running),
+            meanwhile=lambda: self._begin(over),
         )
         rewards, terminated, truncated = self._episodes.judge()
         rewards[~active] = 0.0

@@ -37,20 +37,33 @@ void AgentBatch::replace(std::size_t i, Agent agent) {
 
 void AgentBatch::permit(std::size_t i) { permitted_[i] = agents_[i].world->clear_interrupt(); }
 
-std::vector<std::size_t> AgentBatch::not_permitted(const bool* steps) const {
+std::vector<std::size_t> AgentBatch::not_permitted(const bool* acts) const {
   std::vector<std::size_t> found;
   for (std::size_t i = 0; i < agents_.size(); ++i) {
-    if (steps[i] && permitted_[i] != agents_[i].world->interrupts()) found.push_back(i);
+    if (acts[i] && permitted_[i] != agents_[i].world->interrupts()) found.push_back(i);
   }
   return found;
 }
 
+AgentBatch::Team AgentBatch::team_at(std::size_t i) const {
+  Team team{i, i + 1};
+  while (team.end < agents_.size() && agents_[team.end].world == agents_[i].world) ++team.end;
+  return team;
+}
+
+bool AgentBatch::is_acting(const Team& team, const AgentCommands& commands) {
+  return std::any_of(commands.acts + team.begin, commands.acts + team.end,
+                     [](bool acts) { return acts; });
+}
+
 bool AgentBatch::takes_longer(double seconds, const AgentCommands& commands, const Run& run) {
   double expected = 0.0;
-  for (std::size_t i = 0; i < agents_.size() && expected <= seconds; ++i) {
+  for (std::size_t i = 0; i < agents_.size() && expected <= seconds;) {
+    const Team team = team_at(i);
     Run own = run;
     own.time = agents_[i].world->time();
-    if (commands.steps[i]) expected += agents_[i].world->expected_time(own);
+    if (is_acting(team, commands)) expected += agents_[i].world->expected_time(own);
+    i = team.end;
   }
   return expected > seconds;
 }
@@ -61,8 +74,11 @@ void AgentBatch::start(const AgentCommands& commands, const Run& run, const Agen
   run_ = run;
   rows_ = rows;
   chosen_.clear();
-  for (std::size_t i = 0; i < agents_.size(); ++i) {
-    if (commands.steps[i] || commands.observes[i]) chosen_.push_back(i);
+  for (std::size_t i = 0; i < agents_.size();) {
+    const Team team = team_at(i);
+    while (i < team.end && !is_chosen(i)) ++i;
+    if (i < team.end) chosen_.push_back(team);
+    i = team.end;
   }
   unfinished_.assign(chosen_.size(), std::nullopt);
   work_ = threads_.start(chosen_.size(), num_threads, [this](std::size_t k) { perform(k); });
@@ -79,35 +95,40 @@ std::vector<UnfinishedRun> AgentBatch::finish() {
 }
 
 void AgentBatch::perform(std::size_t k) {
-  const std::size_t i = chosen_[k];
-  RunResult result;
+  const Team team = chosen_[k];
   try {
-    if (commands_.steps[i]) {
-      World& world = *agents_[i].world;
-      Run own = run_;
-      own.time = world.time();
-      result = step(agents_[i], commands_.velocities + 3 * i, own);
-      if (result.steps < own.n) {
-        unfinished_[k] = UnfinishedRun{i, std::move(result), nullptr};
-        return;
-      }
-      world.set_time(own.time + own.n * own.step);
+    if (is_acting(team, commands_) && !step(team, unfinished_[k])) return;
+    for (std::size_t i = team.begin; i < team.end; ++i) {
+      if (commands_.observes[i]) observe(i);
     }
-    if (commands_.observes[i]) observe(i);
   } catch (const std::exception&) {
-    unfinished_[k] = UnfinishedRun{i, {}, std::current_exception()};
+    unfinished_[k] = UnfinishedRun{team.begin, {}, std::current_exception()};
   }
 }
 
-RunResult AgentBatch::step(const Agent& agent, const double* velocity, const Run& run) {
-  World& world = *agent.world;
-  Controller* controller = world.jobs().find_controller(agent.controller);
+bool AgentBatch::step(const Team& team, std::optional<UnfinishedRun>& unfinished) {
+  World& world = *agents_[team.begin].world;
+  for (std::size_t i = team.begin; i < team.end; ++i) {
+    if (commands_.acts[i]) set_command(agents_[i], commands_.velocities + 3 * i);
+  }
+  Run own = run_;
+  own.time = world.time();
+  RunResult result = world.run(own);
+  if (result.steps < own.n) {
+    unfinished = UnfinishedRun{team.begin, std::move(result), nullptr};
+    return false;
+  }
+  world.set_time(own.time + own.n * own.step);
+  return true;
+}
+
+void AgentBatch::set_command(const Agent& agent, const double* velocity) {
+  Controller* controller = agent.world->jobs().find_controller(agent.controller);
   if (controller == nullptr) throw StaleHandleError("the controller was removed");
   set_target(controller->motion, velocity);
-  TouchCollector* touches = world.contacts().touches.find(agent.touches);
+  TouchCollector* touches = agent.world->contacts().touches.find(agent.touches);
   if (touches == nullptr) throw StaleHandleError("the collector was removed");
   touches->was_touched = false;
-  return world.run(run);
 }
 
 void AgentBatch::observe(std::size_t i) {
@@ -122,7 +143,7 @@ void AgentBatch::observe(std::size_t i) {
   std::copy(pose.begin(), pose.end(), rows_.poses + 3 * i);
   std::copy(velocity.begin(), velocity.end(), rows_.velocities + 3 * i);
   std::copy(sensor_pose.begin(), sensor_pose.end(), rows_.sensor_poses + 3 * i);
-  if (commands_.steps[i]) {
+  if (commands_.acts[i]) {
     const TouchCollector* touches = world.contacts().touches.find(agent.touches);
     rows_.touched[i] = touches->was_touched || !touches->touches.empty();
   }

@@ -60,9 +60,9 @@ class PyAgentBatch {
   void replace(std::size_t row, const PyAgent& given) {
     check_row(row);
     Agent agent = to_agent(given);
-    std::vector<Agent> others = batch_.agents();
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(row));
-    check_beside(agent, others);
+    for (std::size_t i = 0; i < batch_.agents().size(); ++i) {
+      if (i != row) check_beside(agent, batch_.agents()[i]);
+    }
     batch_.replace(row, std::move(agent));
     worlds_[row] = std::get<0>(given).world;
   }
@@ -74,19 +74,19 @@ class PyAgentBatch {
     check_row(row);
     batch_.withdraw(row);
   }
-  std::vector<std::size_t> not_permitted(const Rows<bool>& steps) const {
-    check_rows(steps, batch_.agents().size(), 1, "steps");
-    return batch_.not_permitted(steps.data());
+  std::vector<std::size_t> not_permitted(const Rows<bool>& acts) const {
+    check_rows(acts, batch_.agents().size(), 1, "acts");
+    return batch_.not_permitted(acts.data());
   }
 
-  void start(const PyRun& given_run, const Rows<bool>& steps, const Rows<bool>& observes,
+  void start(const PyRun& given_run, const Rows<bool>& acts, const Rows<bool>& observes,
              const Rows<double>& velocities, const Rows<std::uint64_t>& noises, Rows<double>& poses,
              Rows<double>& pose_rates, Rows<double>& sensor_poses, Rows<float>& ranges,
              Rows<bool>& touched, std::size_t num_threads) {
     if (uses_) throw py::value_error("the batch has begun already");
     const std::size_t agents = batch_.agents().size();
     const std::size_t readings = batch_.agents().front().finder->readings();
-    check_rows(steps, agents, 1, "steps");
+    check_rows(acts, agents, 1, "acts");
     check_rows(observes, agents, 1, "observes");
     check_rows(velocities, agents, 3, "velocities");
     check_rows(noises, agents, 2, "noises");
@@ -95,7 +95,7 @@ class PyAgentBatch {
     check_rows(sensor_poses, agents, 3, "sensor_poses");
     check_rows(ranges, agents, readings, "ranges");
     check_rows(touched, agents, 1, "touched");
-    const AgentCommands commands{steps.data(), observes.data(), velocities.data(), noises.data()};
+    const AgentCommands commands{acts.data(), observes.data(), velocities.data(), noises.data()};
     const AgentObservations rows{poses.mutable_data(), pose_rates.mutable_data(),
                                  sensor_poses.mutable_data(), ranges.mutable_data(),
                                  touched.mutable_data()};
@@ -104,7 +104,7 @@ class PyAgentBatch {
     auto uses = std::make_unique<Uses>(batch_.agents(), commands);
     is_long_ = batch_.takes_longer(kShortBatch, commands, run);
     // The arrays must exist until the end.
-    arrays_ = {steps,      observes,     velocities, noises, poses,
+    arrays_ = {acts,       observes,     velocities, noises, poses,
                pose_rates, sensor_poses, ranges,     touched};
     // Safe without the GIL: the worlds are in use.
     batch_.start(commands, run, rows, is_long_ ? num_threads : 1);
@@ -115,7 +115,7 @@ class PyAgentBatch {
     if (!uses_) throw py::value_error("the batch has not begun");
     for (const std::size_t row : rows) {
       check_row(row);
-      if (batch_.is_chosen(row)) throw py::value_error("the agent steps, or is observed already");
+      if (batch_.is_chosen(row)) throw py::value_error("the agent acts, or is observed already");
       // Safe with other threads at work: the world and the rows are those of this agent only.
       World::ExclusiveUse use(*batch_.agents()[row].world, World::kStepping);
       batch_.observe(row);
@@ -141,14 +141,17 @@ class PyAgentBatch {
   }
 
  private:
-  // Exclusive uses of the worlds of the agents that step or are observed; they end together.
+  // Exclusive uses of the worlds of the agents that act or are observed; they end together.
   class Uses {
    public:
     Uses(const std::vector<Agent>& agents, const AgentCommands& commands) {
       uses_.reserve(agents.size());
+      const World* last = nullptr;
       for (std::size_t i = 0; i < agents.size(); ++i) {
-        if (!commands.steps[i] && !commands.observes[i]) continue;
-        uses_.push_back(std::make_unique<World::ExclusiveUse>(*agents[i].world, World::kStepping));
+        World& world = *agents[i].world;
+        if ((!commands.acts[i] && !commands.observes[i]) || &world == last) continue;
+        uses_.push_back(std::make_unique<World::ExclusiveUse>(world, World::kStepping));
+        last = &world;
       }
     }
     void end() { uses_.clear(); }
@@ -157,15 +160,13 @@ class PyAgentBatch {
     std::vector<std::unique_ptr<World::ExclusiveUse>> uses_;
   };
 
-  // Throws a ValueError unless the batch may contain an agent beside the others.
-  static void check_beside(const Agent& agent, const std::vector<Agent>& others) {
-    for (const Agent& other : others) {
-      if (other.world == agent.world) {
-        throw py::value_error("the agents of a batch must have different worlds");
-      }
-      if (other.finder->readings() != agent.finder->readings()) {
-        throw py::value_error("the agents of a batch must have equal numbers of readings");
-      }
+  // Throws a ValueError unless a batch may contain both agents.
+  static void check_beside(const Agent& agent, const Agent& other) {
+    if (other.finder->readings() != agent.finder->readings()) {
+      throw py::value_error("the agents of a batch must have equal numbers of readings");
+    }
+    if (other.world == agent.world && other.body == agent.body) {
+      throw py::value_error("the agents of a batch must have different bodies");
     }
   }
 
@@ -174,7 +175,12 @@ class PyAgentBatch {
     std::vector<Agent> agents;
     for (const PyAgent& each : given) {
       Agent agent = to_agent(each);
-      check_beside(agent, agents);
+      for (const Agent& other : agents) {
+        check_beside(agent, other);
+        if (other.world == agent.world && agents.back().world != agent.world) {
+          throw py::value_error("the agents of a world must be neighbours in a batch");
+        }
+      }
       agents.push_back(std::move(agent));
     }
     return agents;
@@ -374,7 +380,7 @@ Raises:
 void bind_agents(py::module_& module) {
   bind_agent_rows(module);
   py::class_<PyAgentBatch>(module, "AgentBatch", R"(
-Driven bodies with range finders, each in a world of its own, which advance in parallel.
+Driven bodies with range finders, in worlds that advance in parallel.
 )")
       .def(py::init<const std::vector<PyAgent>&>(), py::arg("agents"), R"(
 Creates a batch of n agents.
@@ -384,11 +390,12 @@ Args:
         and a range finder.
 
 Raises:
-    ValueError: Two agents have the same world, their numbers of readings differ, or a range finder
-        measures intensities.
+    ValueError: The agents of a world are not neighbours, two agents have the same body, their
+        numbers of readings differ, or a range finder measures intensities.
 )")
       .def("replace", &PyAgentBatch::replace, py::arg("row"), py::arg("agent"), R"(
-Replaces an agent by one of another world, which has no permission.
+Replaces an agent by one of another world, which has no permission. All agents of a world must be
+replaced before `start`.
 
 Args:
     row: Index of the agent.
@@ -419,16 +426,16 @@ Args:
 Raises:
     IndexError: There is no such agent.
 )")
-      .def("not_permitted", &PyAgentBatch::not_permitted, py::arg("steps").noconvert(), R"(
+      .def("not_permitted", &PyAgentBatch::not_permitted, py::arg("acts").noconvert(), R"(
 Returns the agents without a permission.
 
 Args:
-    steps: Agents that are examined, shape (n,).
+    acts: Agents that are examined, shape (n,).
 
 Raises:
     ValueError: The array has another shape.
 )")
-      .def("start", &PyAgentBatch::start, py::arg("run"), py::arg("steps").noconvert(),
+      .def("start", &PyAgentBatch::start, py::arg("run"), py::arg("acts").noconvert(),
            py::arg("observes").noconvert(), py::arg("velocities").noconvert(),
            py::arg("noises").noconvert(), py::arg("poses").noconvert(),
            py::arg("pose_rates").noconvert(), py::arg("sensor_poses").noconvert(),
@@ -437,14 +444,14 @@ Raises:
 Sets the commands of agents, and begins to step their worlds and to observe them.
 
 Other threads do this until `finish`. Meanwhile these worlds and the arrays must not be used, except
-for the rows of agents that neither step nor are observed. All arrays are C-contiguous, with a row for each agent. The results do not depend on the number of
-threads.
+for the rows of agents that neither act nor are observed. All arrays are C-contiguous, with a row for
+each agent. The results do not depend on the number of threads.
 
 Args:
     run: The steps, as `Run`; each world has a time of its own, which it advances if the steps are
         complete.
-    steps: Whether the world of the agent steps, shape (n,).
-    observes: Whether the agent is observed, after its steps, shape (n,).
+    acts: Whether the agent has a command, and its world steps, shape (n,).
+    observes: Whether the agent is observed, after the steps of its world, shape (n,).
     velocities: Commands (forward, sideways, omega), or (speed, 0, steering angle) for a drive that is
         steered [m/s, rad/s, rad], shape (n, 3).
     noises: Stream and number of the update of each scan, shape (n, 2).
@@ -452,7 +459,7 @@ Args:
     pose_rates: Receives the velocities of their origins (vx, vy, omega), shape (n, 3).
     sensor_poses: Receives the poses of the range finders in the world frame, shape (n, 3).
     ranges: Receives the readings [m], shape (n, readings), float32.
-    touched: Receives whether an agent touched anything in its steps, shape (n,).
+    touched: Receives whether an agent that acts touched anything in the steps, shape (n,).
     num_threads: Maximum number of threads; 0 for one per core.
 
 Raises:
@@ -461,7 +468,7 @@ Raises:
     WorldLockedError: A world is in use.
 )")
       .def("observe", &PyAgentBatch::observe, py::arg("rows"), R"(
-Observes agents between `start` and `finish` that neither step nor are observed by these.
+Observes agents between `start` and `finish` whose worlds these do not concern.
 
 Args:
     rows: Indices of the agents.
@@ -483,8 +490,8 @@ Raises:
 Completes what `start` has begun.
 
 Returns:
-    Agents whose steps are not complete, with what `JobQueue.run` returns or raises. They are not
-    observed.
+    The first agents of worlds whose steps are not complete, with what `JobQueue.run` returns or
+    raises. No agents of these worlds are observed.
 
 Raises:
     ValueError: `start` was not called.

@@ -12,7 +12,14 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from flatland.errors import StaleHandleError, WorldError, WorldLockedError
-from flatland.gym import FlatlandVectorEnv
+from flatland.gym import (
+    CommandLatency,
+    FlatlandVectorEnv,
+    FleetVectorEnv,
+    RandomGoal,
+    ScanNoise,
+    make_parallel,
+)
 from flatland.gym.endings import Arrived
 from flatland.plugins.laser import Laser
 from flatland.runtime.observer import WorldObserver
@@ -172,7 +179,9 @@ def test_changes_from_outside_end_the_permission_of_the_core(env: Any, change: s
         world.pause()
     batch = env._episodes._batch
     for count in (1, 2):
-        assert batch.perform(COMMANDS, np.ones(COUNT, np.bool_), 20, lambda: None).tolist() == [1]
+        assert batch.perform(
+            COMMANDS, np.ones(COUNT, np.bool_), None, 20, lambda: None
+        ).tolist() == [1]
         assert len(values) == (count if change == "on_set" else 0)
 
 
@@ -219,7 +228,7 @@ def test_the_next_episodes_begin_while_other_worlds_step(env: Any) -> None:
                 refused.append(row)
 
     acting = np.array([True, False, True])
-    assert env._episodes._batch.perform(COMMANDS, acting, 20, meanwhile).tolist() == []
+    assert env._episodes._batch.perform(COMMANDS, acting, None, 20, meanwhile).tolist() == []
     assert refused == [0, 2]
     assert env.poses[1].tolist() == pytest.approx([3.0, 2.0, 1.0])
     assert [world.time for world in env.worlds] == pytest.approx([0.2, 0.1, 0.2])
@@ -230,7 +239,92 @@ def test_an_exception_while_worlds_step_leaves_them_complete(env: Any) -> None:
         raise ValueError("no start")
 
     with pytest.raises(ValueError, match="no start"):
-        env._episodes._batch.perform(COMMANDS, np.array([True, False, True]), 20, fail)
+        env._episodes._batch.perform(COMMANDS, np.array([True, False, True]), None, 20, fail)
     assert [world.time for world in env.worlds] == pytest.approx([0.1, 0.0, 0.1])
     env.step(np.full((COUNT, 2), 0.1))
     assert [world.time for world in env.worlds] == pytest.approx([0.2, 0.1, 0.2])
+
+
+ROBOTS = 3
+FLEET: dict[str, Any] = {
+    "num_robots": ROBOTS,
+    "max_steps": 30,
+    "randomization": ScanNoise((0.0, 0.1)) + CommandLatency((0, 2)),
+    "task": RandomGoal((0.4, 2.0)),
+}
+
+
+def run_fleets(
+    env: FleetVectorEnv, disturb: Callable[[int], None] = lambda _: None
+) -> tuple[list[Any], int]:
+    """Returns all results of random episodes, and how often a robot had none beside others."""
+    rng = np.random.default_rng(2)
+    results: list[Any] = []
+    waits = 0
+    env.reset(seed=5)
+    for step in range(2 * STEPS):
+        disturb(step)
+        actions = rng.uniform([0.0, -1.0], [1.0, 1.0], (env.num_envs, 2)).astype(np.float32)
+        *values, infos = env.step(actions)
+        results.append([np.asarray(value).tobytes() for value in values])
+        results.append([infos["distance"].tobytes(), infos["collision"].tobytes()])
+        results.append([(world.state_hash(), world.time) for world in env.worlds])
+        active = infos["is_active"].reshape(-1, ROBOTS)
+        waits += int((active.any(axis=1) & ~active.all(axis=1)).sum())
+    return results, waits
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_robots_of_one_world_have_the_results_of_steps_in_python(
+    make: Make, mode: AutoresetMode
+) -> None:
+    env, attended, watched = (
+        make(FleetVectorEnv, COUNT, autoreset_mode=mode, num_threads=2, **FLEET) for _ in range(3)
+    )
+    attended._episodes._batch = None
+    watcher = Watcher()
+    watched.worlds[1].add_observer(watcher)
+    expected, waits = run_fleets(attended)
+    assert waits > STEPS
+    assert run_fleets(env) == run_fleets(watched) == (expected, waits)
+    assert watcher.starts > STEPS
+    # Without such questions about the worlds, the core performs the steps alone.
+    env.reset(seed=0)
+    env.step(np.zeros((env.num_envs, 2), np.float32))
+    batch = env._episodes._batch
+    assert batch is not None
+    assert batch._core.not_permitted(np.ones(env.num_envs, np.bool_)) == []
+
+
+def test_changes_of_a_world_of_several_robots_are_performed_in_their_step(make: Make) -> None:
+    env, attended = (make(FleetVectorEnv, COUNT, **FLEET) for _ in range(2))
+    attended._episodes._batch = None
+
+    def disturb(env: FleetVectorEnv, step: int) -> None:
+        world, agents = env.worlds[1], env._episodes.agents
+        if step % 9 == 4:
+            agents[ROBOTS].command.set(Twist(0.2, 0.0, 0.5))
+        if step % 9 == 6:
+            world.post(lambda: world.move_model("robot_1", (3.0, 2.0, 1.0), "allow"))
+        if step % 9 == 8:
+            world.pause() if not world.paused else world.resume()
+
+    assert run_fleets(env, lambda step: disturb(env, step)) == run_fleets(
+        attended, lambda step: disturb(attended, step)
+    )
+
+
+def test_a_fleet_observes_robots_whose_episodes_have_ended(make: Make) -> None:
+    env, attended = (make(make_parallel, **FLEET) for _ in range(2))
+    attended._episodes._batch = None
+    found: list[list[Any]] = [[], []]
+    for fleet, results in zip((env, attended), found, strict=True):
+        rng = np.random.default_rng(0)
+        for seed in range(3):
+            fleet.reset(seed=seed)
+            while fleet.agents:
+                live = list(fleet.agents)
+                fleet.step({name: rng.uniform(-1, 1, 2).astype(np.float32) for name in live})
+                results.append((live, fleet.state().tobytes(), fleet.world.state_hash()))
+    assert found[0] == found[1]
+    assert any(0 < len(live) < ROBOTS for live, *_ in found[0])
