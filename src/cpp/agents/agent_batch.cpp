@@ -94,8 +94,19 @@ std::vector<UnfinishedRun> AgentBatch::finish() {
   return found;
 }
 
+void AgentBatch::prefetch_after(std::size_t k) const {
+  // With two threads, the team after the next one is usually the next one of this thread.
+  constexpr std::size_t kNext = 2;
+  for (int stage = 0; stage < World::kPrefetchStages; ++stage) {
+    const std::size_t later =
+        k + kNext + static_cast<std::size_t>(World::kPrefetchStages - 1 - stage);
+    if (later < chosen_.size()) agents_[chosen_[later].begin].world->prefetch(stage);
+  }
+}
+
 void AgentBatch::perform(std::size_t k) {
   const Team team = chosen_[k];
+  prefetch_after(k);
   try {
     if (is_acting(team, commands_) && !step(team, unfinished_[k])) return;
     for (std::size_t i = team.begin; i < team.end; ++i) {
@@ -149,10 +160,9 @@ void AgentBatch::observe(std::size_t i) {
   }
   const Readings readings{rows_.ranges + i * agent.finder->readings(), nullptr};
   const NoiseKey key{commands_.noises[2 * i], commands_.noises[2 * i + 1]};
-  ScanMemoryPool& memories = world.rays().memories();
-  std::unique_ptr<ScanMemory> memory = memories.take();
+  std::unique_ptr<ScanMemory> memory = memories_.take();
   agent.finder->scan(SceneView(world.rays()), origin, key, readings, *memory);
-  memories.give_back(std::move(memory));
+  memories_.give_back(std::move(memory));
 }
 
 }  // namespace flatland

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "rays/range_finder.h"
+#include "rays/scan_memory.h"
 #include "world/world.h"
 
 namespace flatland {
@@ -93,6 +94,8 @@ class AgentBatch {
   Team team_at(std::size_t i) const;
   // Returns whether an agent of a team acts.
   static bool is_acting(const Team& team, const AgentCommands& commands);
+  // Begins to load the worlds of later teams into the cache.
+  void prefetch_after(std::size_t k) const;
   void perform(std::size_t k);
   // Steps the world of a team. Returns false if steps remain.
   bool step(const Team& team, std::optional<UnfinishedRun>& unfinished);
@@ -102,6 +105,7 @@ class AgentBatch {
   std::vector<std::uint64_t> permitted_;  // interrupts of the world at the time of the permission
 
   ThreadPool threads_;
+  ScanMemoryPool memories_;  // of all worlds, so that it remains in the cache
 
   // What `start` has begun.
   AgentCommands commands_{};

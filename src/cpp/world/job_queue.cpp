@@ -257,6 +257,12 @@ void JobQueue::count(World& world, Callback& callback) const {
 
 std::vector<FailedJob> JobQueue::take_failed() { return std::exchange(failed_, {}); }
 
+void JobQueue::prefetch() const {
+  controllers_.prefetch();
+  callbacks_.prefetch();
+  flatland::prefetch(clocks_);
+}
+
 void JobQueue::clear() {
   JobQueue empty;
   empty.exclude_ids_of(*this);

@@ -119,6 +119,8 @@ class JobQueue {
 
   // Removes all jobs.
   void clear();
+  // Begins to load what a step needs into the cache.
+  void prefetch() const;
   // Excludes the ids that another queue has returned, see SlotMap.
   void exclude_ids_of(const JobQueue& other);
 

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "prefetch.h"
+
 namespace flatland {
 
 // 4 bits of kind, 28 bits of generation and 32 bits of slot. Kinds are from 1 to 7, so that ids of
@@ -75,6 +77,7 @@ class SlotMap {
     }
   }
 
+  void prefetch() const { flatland::prefetch(slots_); }
   void reserve(std::size_t more) { slots_.reserve(slots_.size() + more); }
   std::size_t size() const { return size_; }
 

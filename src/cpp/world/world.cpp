@@ -236,6 +236,26 @@ bool World::wait_until(std::chrono::steady_clock::time_point time) {
   return !interrupt_.wait_until(lock, time, [this] { return is_interrupted(); });
 }
 
+void World::prefetch(int stage) const {
+  if (stage == 0) {
+    flatland::prefetch(this, sizeof(World));
+  } else if (stage == 1) {
+    // The engine contains a large buffer, which is not used here, before its other members.
+    flatland::prefetch(&engine_->GetContactManager(), 2 * sizeof(b2ContactManager));
+    bodies_.prefetch();
+    jobs_.prefetch();
+  } else {
+    for (const b2Body* body = engine_->GetBodyList(); body != nullptr; body = body->GetNext()) {
+      flatland::prefetch(body, sizeof(b2Body));
+      if (body->GetType() == b2_staticBody) continue;
+      for (const b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) {
+        flatland::prefetch(f, sizeof(b2Fixture));
+        flatland::prefetch(f->GetShape(), sizeof(b2CircleShape));
+      }
+    }
+  }
+}
+
 std::vector<Id> World::still_invalid() const {
   std::vector<Id> ids;
   for (const Id id : invalid_) {

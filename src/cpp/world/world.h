@@ -195,6 +195,13 @@ class World final : private b2DestructionListener {
   // used while the world is in shared or exclusive use by the calling thread.
   ThreadPool& threads() { return threads_; }
 
+  // Begins to load what a step needs into the cache, for callers that step many worlds in turn. To
+  // be called with the stages from 0 on, while other worlds are stepped: each stage reads the
+  // places of its data in data that the previous one has loaded. Another thread may step the world:
+  // places are read only where steps do not change them.
+  static constexpr int kPrefetchStages = 3;
+  void prefetch(int stage) const;
+
   static constexpr const char* kStepping = "is stepping";
 
   // Exclusive use of the world by one thread, for long changes without the GIL. Both kinds of use
