@@ -137,10 +137,7 @@ class Batch:
                         self._not_permitted(standing, True)
             finally:
                 unfinished = self._finish(observes)
-                if alone is self._all:
-                    self._commands[:] = commands
-                else:
-                    self._commands[alone] = commands[alone]
+                np.copyto(self._commands, commands, where=alone[:, np.newaxis])
                 self._counts += alone
                 self._complete(unfinished, n)
         if refused:

@@ -262,13 +262,14 @@ def masked_infos(episodes: Episodes, mask: BoolArray | None = None) -> dict[str,
         episodes: The episodes of all environments.
         mask: The environments, shape (n,); None for all.
     """
+    chosen = np.ones(len(episodes.agents), np.bool_) if mask is None else mask
     infos: dict[str, Any] = {}
     for name, values in episodes.infos().items():
         if mask is None:
-            infos[name], infos[f"_{name}"] = values.copy(), np.ones(len(values), np.bool_)
+            infos[name] = values.copy()
         else:
             infos[name] = np.where(mask, values, np.zeros(1, values.dtype))
-            infos[f"_{name}"] = mask.copy()
+        infos[f"_{name}"] = chosen.copy()
     return infos
 
 

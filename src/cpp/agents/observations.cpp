@@ -11,6 +11,14 @@ float unit_limited(double number) { return std::clamp(static_cast<float>(number)
 // The lesser of two ranges, of which NaN is the greater one.
 float nearer(float a, float b) { return b < a || std::isnan(a) ? b : a; }
 
+// Combines groups of neighbours to their nearest range.
+void combine(const float* ranges, std::size_t group, std::size_t count, float* out) {
+  for (std::size_t k = 0; k < count; ++k, ranges += group) {
+    out[k] = ranges[0];
+    for (std::size_t j = 1; j < group; ++j) out[k] = nearer(out[k], ranges[j]);
+  }
+}
+
 double rewarded(const AgentPlaces& places, std::size_t i, Rewarded what) {
   switch (what) {
     case Rewarded::kProgress:
@@ -50,19 +58,18 @@ void write_scans(const float* ranges, std::size_t agents, std::size_t beams, flo
   for (std::size_t i = 0; i < agents; ++i) {
     const float* from = ranges + i * beams;
     float* to = out.row(i);
-    for (std::size_t k = 0; k < out.count; ++k, from += group) {
-      float range = from[0];
-      for (std::size_t j = 1; j < group; ++j) range = nearer(range, from[j]);
-      to[k] = range;
+    if (group > 1) {
+      combine(from, group, out.count, to);
+      from = to;
     }
     if (half > 0.0F) {
       for (std::size_t k = 0; k < out.count; ++k) {
-        const float range = std::max(to[k], 0.0F);
-        to[k] = to[k] < length ? range / (range + half) : 1.0F;
+        const float range = std::max(from[k], 0.0F);
+        to[k] = from[k] < length ? range / (range + half) : 1.0F;
       }
     } else {
       for (std::size_t k = 0; k < out.count; ++k) {
-        to[k] = std::max(to[k] < length ? to[k] : length, 0.0F) / length;
+        to[k] = std::max(from[k] < length ? from[k] : length, 0.0F) / length;
       }
     }
   }
