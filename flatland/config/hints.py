@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 from collections.abc import Callable, Iterable
@@ -97,6 +96,8 @@ def _similar(word: str, candidates: Iterable[str]) -> list[str]:
     """Returns the candidates that are similar to a word, the most similar one first."""
     by_lower = {candidate.lower(): candidate for candidate in candidates}
     lower = word.lower()
+    import difflib  # late, since only mistakes need it
+
     found = difflib.get_close_matches(lower, by_lower, _MAX_SUGGESTIONS, _MIN_SIMILARITY)
     if not found:
         return []

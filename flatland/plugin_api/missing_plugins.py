@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
@@ -181,5 +180,7 @@ def _short(name: str) -> str:
 
 def _similarity(name: str, other: str) -> float:
     """Returns the similarity of two class names, ignoring packages and case, in [0, 1]."""
+    import difflib  # late, since only mistakes need it
+
     a, b = (re.split(r"::|[/.]", full)[-1].lower() for full in (name, other))
     return difflib.SequenceMatcher(None, a, b).ratio()

@@ -6,7 +6,6 @@ Reading manifests imports no plugin; a class is imported when it is first instan
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 import importlib.resources
 import logging
 import os
@@ -15,6 +14,7 @@ import threading
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from flatland.errors import PLUGIN_FAULTS, PluginError
 from flatland.plugin_api.manifest import PluginClass, listed_manifests, lookup_name, read_manifest
@@ -27,6 +27,9 @@ from flatland.plugin_api.package_exports import (
 )
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin
 
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
 _LOG = logging.getLogger("flatland")
 
 ENTRY_POINT_GROUP = "flatland.plugins"
@@ -35,7 +38,7 @@ _BASE_CLASSES: dict[str, type[FlatlandPlugin]] = {
     "flatland::WorldPlugin": WorldPlugin,
 }
 _Times = dict[str, int | None]
-_last_entry_points: tuple[_Times | None, Sequence[importlib.metadata.EntryPoint]] = (None, ())
+_last_entry_points: tuple[_Times | None, Sequence[EntryPoint]] = (None, ())
 # Worlds may load concurrently in several threads, and sys.path is shared by the process.
 _IMPORT_LOCK = threading.RLock()
 
@@ -63,13 +66,16 @@ def _entry_point_manifests() -> tuple[list[str], list[PluginError]]:
     return manifests, problems
 
 
-def _entry_points() -> Sequence[importlib.metadata.EntryPoint]:
+def _entry_points() -> Sequence[EntryPoint]:
     """Returns the entry points of the group, cached until a folder of `sys.path` changes."""
+    # Late, since it takes 4 ms, and most worlds need only included plugins.
+    from importlib.metadata import entry_points
+
     global _last_entry_points
     start = time.time_ns()
     times = {folder: modification_time(folder or ".") for folder in sys.path}
     if times != _last_entry_points[0]:
-        found = tuple(importlib.metadata.entry_points(group=ENTRY_POINT_GROUP))
+        found = tuple(entry_points(group=ENTRY_POINT_GROUP))
         _last_entry_points = (times if are_settled(times, start) else None, found)
     return _last_entry_points[1]
 
