@@ -94,10 +94,10 @@ def _question(names: Iterable[str]) -> str:
 
 def _similar(word: str, candidates: Iterable[str]) -> list[str]:
     """Returns the candidates that are similar to a word, the most similar one first."""
-    by_lower = {candidate.lower(): candidate for candidate in candidates}
-    lower = word.lower()
     import difflib  # late, since only mistakes need it
 
+    by_lower = {candidate.lower(): candidate for candidate in candidates}
+    lower = word.lower()
     found = difflib.get_close_matches(lower, by_lower, _MAX_SUGGESTIONS, _MIN_SIMILARITY)
     if not found:
         return []

@@ -68,7 +68,7 @@ def _entry_point_manifests() -> tuple[list[str], list[PluginError]]:
 
 def _entry_points() -> Sequence[EntryPoint]:
     """Returns the entry points of the group, cached until a folder of `sys.path` changes."""
-    # Late, since it takes 4 ms, and most worlds need only included plugins.
+    # Late, since most worlds need only included plugins.
     from importlib.metadata import entry_points
 
     global _last_entry_points

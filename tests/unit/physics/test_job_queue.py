@@ -9,7 +9,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flatland.physics import AgentBatch, PhysicsBody, PhysicsWorld, RangeFinder, Run, RunEnd
+from flatland.physics import (
+    AgentBatch,
+    Controller,
+    PhysicsBody,
+    PhysicsWorld,
+    RangeFinder,
+    Run,
+    RunEnd,
+    Touches,
+)
 from flatland.plugin_api.update_timer import UpdateTimer
 
 STEP = 10_000_000  # ns
@@ -113,10 +122,27 @@ def test_clocks_of_removed_callbacks_are_reused(world: PhysicsWorld) -> None:
     assert _heap_use() - before < 50_000  # 5 B for each clock; one that is kept takes 32 B
 
 
-def test_interrupts_never_amount_to_a_permission(world: PhysicsWorld) -> None:
+def agent_in(world: PhysicsWorld) -> tuple[PhysicsBody, Controller, Touches, RangeFinder]:
     body = world.create_body("dynamic", (0, 0, 0))
     beams = RangeFinder(np.array([(1.0, 0.0)]), 1.0, origin=(0, 0, 0), mask=1)
-    batch = AgentBatch([(body, body.control_velocity(), world.collect_touches([body]), beams)])
+    return body, body.control_velocity(), world.collect_touches([body]), beams
+
+
+def test_the_agents_of_a_world_are_neighbours_with_different_bodies(world: PhysicsWorld) -> None:
+    first, second, other = agent_in(world), agent_in(world), agent_in(PhysicsWorld())
+    with pytest.raises(ValueError, match="the agents of a world must be neighbours in a batch"):
+        AgentBatch([first, other, second])
+    with pytest.raises(ValueError, match="must have different bodies"):
+        AgentBatch([first, first])
+    batch = AgentBatch([first, second, other])
+    with pytest.raises(ValueError, match="must have different bodies"):
+        batch.replace(2, second)
+    batch.replace(2, agent_in(PhysicsWorld()))
+    assert batch.not_permitted(np.ones(3, np.bool_)) == [0, 1, 2]
+
+
+def test_interrupts_never_amount_to_a_permission(world: PhysicsWorld) -> None:
+    batch = AgentBatch([agent_in(world)])
     for _ in range(3):
         assert batch.not_permitted(np.array([True])) == [0]
         world.jobs.interrupt()
