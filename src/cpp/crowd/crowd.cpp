@@ -136,13 +136,13 @@ bool Crowd::is_standing(const Person& person) const {
 }
 
 std::size_t Crowd::reach_of(World& world, std::uint32_t waypoint) {
-  read_surroundings(world);
+  read_surroundings(world, 0.0);
   const Way* way = way_of(waypoint);
   return way == nullptr ? 1 : way->field().reached();
 }
 
 Vec Crowd::way_from(World& world, std::uint32_t waypoint, Vec place) {
-  read_surroundings(world);
+  read_surroundings(world, 0.0);
   const Way* way = way_of(waypoint);
   return way == nullptr ? unit(waypoints_[waypoint].place.nearest(place) - place, {1.0, 0.0})
                         : way->field().direction(place, surroundings_.walls());
@@ -171,13 +171,16 @@ std::vector<double> Crowd::state() const {
     numbers.insert(numbers.end(), queue.begin(), queue.end());
   }
   for (const Signal& signal : signals_) {
-    add({static_cast<double>(signal.direction), static_cast<double>(signal.opposed_since)});
+    add({static_cast<double>(signal.gate), static_cast<double>(signal.direction),
+         static_cast<double>(signal.opposed_since)});
   }
   return numbers;
 }
 
-void Crowd::read_surroundings(const World& world) {
-  if (surroundings_.read(world.engine(), own_)) has_grid_ = false;
+void Crowd::read_surroundings(const World& world, double period) {
+  double reach = std::max({kGateWidth, FreeGrid::range(settings_.clearance), settings_.leg_radius});
+  for (const Person& person : people_) reach = std::max(reach, wall_range(person, period));
+  if (surroundings_.read(world.engine(), own_, reach)) has_grid_ = false;
   if (has_grid_) return;
   has_grid_ = true;
   for (auto& way : way_to_) way.reset();
@@ -195,7 +198,6 @@ void Crowd::read_surroundings(const World& world) {
   ways_ = std::make_shared<Ways>(
       FreeGrid(walls, low - margin, high + margin, settings_.cell, settings_.clearance),
       surroundings_.shared_walls());
-  signals_.resize(ways_->gates().size());
 }
 
 void Crowd::read_people(World& world) {

@@ -88,7 +88,8 @@ class Crowd {
   // everybody, kFixed (stopped or in a queue) to nobody.
   enum class Stance : std::uint8_t { kWalking, kIdle, kFixed };
 
-  void read_surroundings(const World& world);
+  // `period` is the time between two updates [s]; it may be 0 if nobody walks.
+  void read_surroundings(const World& world, double period);
   void read_people(World& world);
   // Null if the person was removed.
   const Person* numbered(std::uint32_t number) const;
@@ -122,13 +123,16 @@ class Crowd {
   // right_of_way.cpp: who passes a door first, and on which side people pass each other.
   struct Approach {
     std::size_t person = 0;
-    std::size_t gate = 0;
+    std::uint32_t gate = 0;
     int direction = 0;  // index of a direction, see Demand
     bool is_inside = false;
+    double distance = 0.0;  // distance from the center of the gate [m]
   };
 
   void keep_doors_clear(std::vector<Choice>& choices, std::int64_t step, double dt);
-  bool approaches(std::size_t i, const Choice& choice, std::size_t gate, Approach& approach);
+  void find_approaches(std::size_t i, const Choice& choice, std::vector<Approach>& found);
+  Signal signal_of(std::uint32_t gate) const;
+  void update_signals(std::vector<Approach> approaching, std::int64_t step, double dt);
   Choice step_aside(const Person& person, const Choice& choice, const Approach& approach) const;
   bool comes_towards(const Person& person, Vec way, std::size_t j, const Choice& choice,
                      double& ahead) const;
@@ -144,6 +148,8 @@ class Crowd {
 
   // motion.cpp: how a person moves.
   void find_neighbours();
+  // Returns the range within which walls have an effect on a person.
+  static double wall_range(const Person& person, double period);
   void find_walls(double period);
   // Appends the points of walls within a range of person i, at most that of `find_walls`.
   void add_walls(std::size_t i, double range, std::vector<NearPoint>& found) const;
@@ -168,7 +174,7 @@ class Crowd {
   std::shared_ptr<Ways> ways_;                      // null in a world without walls
   bool has_grid_ = false;                           // whether `ways_` and `way_to_` match the walls
   std::vector<std::shared_ptr<const Way>> way_to_;  // by waypoint, null if not needed yet
-  std::vector<Signal> signals_;                     // by gate
+  std::vector<Signal> signals_;                     // of the gates with people, by gate
 
   // The members below are valid within one update.
   std::vector<std::uint32_t> guests_;  // number of people who stand at each waypoint

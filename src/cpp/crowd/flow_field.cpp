@@ -7,10 +7,11 @@
 #include <queue>
 #include <utility>
 
+#include "prefetch.h"
+
 namespace flatland::crowd {
 namespace {
 
-constexpr double kClearance = 0.4;     // gap beyond which a wall has no effect on the time [m]
 constexpr double kMostSlowness = 4.0;  // time to cross a metre next to a wall [s]
 constexpr float kNever = std::numeric_limits<float>::infinity();
 constexpr double kUnit = 127.0;  // length of the stored directions
@@ -104,7 +105,7 @@ FreeGrid::FreeGrid(const Walls& walls, Vec low, Vec high, double cell, double ra
   rows_ = static_cast<std::int64_t>(size.y / cell_) + 1;
   slowness_.resize(static_cast<std::size_t>(columns_ * rows_));
   for (std::size_t i = 0; i < slowness_.size(); ++i) {
-    const double gap = walls.distance(center(i), radius + kClearance) - radius;
+    const double gap = walls.distance(center(i), range(radius)) - radius;
     const double slowness = std::min(kClearance / std::max(gap, 1e-9), kMostSlowness);
     slowness_[i] = gap < 0.0 ? 0.0F : static_cast<float>(slowness);
   }
@@ -142,6 +143,18 @@ FlowField::FlowField(const FreeGrid& grid, const Place& place)
           static_cast<std::int8_t>(std::lround(kUnit * direction.x)),
           static_cast<std::int8_t>(std::lround(kUnit * direction.y))};
     }
+  }
+}
+
+void FlowField::prefetch(Vec p) const {
+  const auto bounded = [](double coordinate, std::int64_t count) {
+    return static_cast<std::int64_t>(
+        std::min(std::max(0.0, coordinate), static_cast<double>(count - 1)));
+  };
+  const std::int64_t column = bounded((p.x - low_.x) / cell_ - 0.5, columns_);
+  const std::int64_t row = bounded((p.y - low_.y) / cell_ - 0.5, rows_);
+  for (const std::int64_t each : {row, std::min(row + 1, rows_ - 1)}) {
+    flatland::prefetch(&directions_[index(column, each)], 2 * sizeof(Direction));
   }
 }
 

@@ -27,6 +27,9 @@ class FreeGrid {
   // would be too many of them, see `cell_size`.
   FreeGrid(const Walls& walls, Vec low, Vec high, double cell, double radius);
 
+  // Returns the distance within which walls have an effect on a disc of a radius [m].
+  static double range(double radius) { return radius + kClearance; }
+
   std::int64_t columns() const { return columns_; }
   std::int64_t rows() const { return rows_; }
   double cell() const { return cell_; }
@@ -36,6 +39,8 @@ class FreeGrid {
   float slowness(std::size_t index) const { return slowness_[index]; }
 
  private:
+  static constexpr double kClearance = 0.4;  // gap beyond which a wall has no effect [m]
+
   Vec low_;
   double cell_;
   std::int64_t columns_, rows_;
@@ -52,6 +57,8 @@ class FlowField {
   // Returns the unit vector of the way from a point, a zero vector if there is none. From a point
   // at which the disc does not fit, the way leads to the nearest visible cell with a way.
   Vec direction(Vec p, const Walls& walls) const;
+  // Begins to load what `direction` reads for a point into the cache: a field is large.
+  void prefetch(Vec p) const;
 
  private:
   // A vector of the length kUnit; (0, 0) if there is no way.

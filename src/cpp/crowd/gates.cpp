@@ -8,7 +8,6 @@
 namespace flatland::crowd {
 namespace {
 
-constexpr double kWidth = 1.35;      // greatest width of a passage [m]
 constexpr double kOpposite = -0.8;   // cosine of the angle between directions to opposite walls
 constexpr double kMostDepth = 3.0;   // greatest half of the length of a passage [m]
 constexpr double kMostOffset = 0.9;  // greatest distance of a cell from the axis of a passage [m]
@@ -26,7 +25,7 @@ struct Throat {
 // cross-section in this case.
 bool is_between(const Walls& walls, Vec p, std::vector<NearPoint>& near, Throat& throat) {
   near.clear();
-  walls.find_near(p, kWidth, near);
+  walls.find_near(p, kGateWidth, near);
   if (near.empty()) return false;
   const auto nearest =
       std::min_element(near.begin(), near.end(), [](const NearPoint& a, const NearPoint& b) {
@@ -34,7 +33,7 @@ bool is_between(const Walls& walls, Vec p, std::vector<NearPoint>& near, Throat&
                std::tie(b.distance, b.point.x, b.point.y);
       });
   const Vec direction = unit(nearest->point - p);
-  throat.width = kWidth;
+  throat.width = kGateWidth;
   for (const NearPoint& other : near) {
     if (dot(direction, unit(other.point - p)) > kOpposite) continue;
     const double width = length(other.point - nearest->point);
@@ -43,7 +42,7 @@ bool is_between(const Walls& walls, Vec p, std::vector<NearPoint>& near, Throat&
     throat.b = other.point;
     throat.width = width;
   }
-  return throat.width < kWidth;
+  return throat.width < kGateWidth;
 }
 
 // Returns the connected narrow cells that contain a first cell, and marks them by a width of 0.

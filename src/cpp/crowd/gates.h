@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "crowd/flow_field.h"
@@ -9,6 +10,9 @@
 #include "vec.h"
 
 namespace flatland::crowd {
+
+inline constexpr double kGateWidth = 1.35;  // greatest width of a passage [m]
+inline constexpr double kGateReach = 4.0;   // distance within which people approach a passage [m]
 
 // A straight passage that is too narrow for two people side by side.
 struct Gate {
@@ -26,12 +30,15 @@ std::vector<Gate> find_gates(const FreeGrid& grid, const Walls& walls);
 struct Demand {
   std::uint32_t inside[2] = {0, 0};   // number of people in the passage
   std::uint32_t waiting[2] = {0, 0};  // number of people in front of the passage
-  double nearest[2] = {0.0, 0.0};     // least distance of the waiting people [m]
+  // Least distance of the waiting people [m].
+  double nearest[2] = {std::numeric_limits<double>::infinity(),
+                       std::numeric_limits<double>::infinity()};
 };
 
-// The direction that has the right of way. The directions take turns; people in the passage leave
-// before the next turn begins.
+// The direction that has the right of way at a gate. The directions take turns; people in the
+// passage leave before the next turn begins.
 struct Signal {
+  std::uint32_t gate = 0;
   std::int8_t direction = -1;      // index of the direction, -1 for none
   bool is_closing = false;         // whether only people in the passage may walk on
   std::int64_t opposed_since = 0;  // step since which people wait in the other direction, or 0

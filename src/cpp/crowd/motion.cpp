@@ -73,13 +73,16 @@ void Crowd::find_neighbours() {
   }
 }
 
+double Crowd::wall_range(const Person& person, double period) {
+  return person.radius + std::max(kWallSight, kSkin + most_speed(person) * period);
+}
+
 void Crowd::find_walls(double period) {
   near_walls_.clear();
   near_wall_starts_.clear();
   for (const Person& person : people_) {
     near_wall_starts_.push_back(static_cast<std::uint32_t>(near_walls_.size()));
-    const double reach = std::max(kWallSight, kSkin + most_speed(person) * period);
-    surroundings_.walls().find_near(person.position, person.radius + reach, near_walls_);
+    surroundings_.walls().find_near(person.position, wall_range(person, period), near_walls_);
   }
   near_wall_starts_.push_back(static_cast<std::uint32_t>(near_walls_.size()));
 }
@@ -221,7 +224,11 @@ Vec Crowd::without_contact(std::size_t i, Vec velocity, double period) {
 void Crowd::update(World& world, std::int64_t step, double dt) {
   const double period = dt * static_cast<double>(settings_.interval);
   read_people(world);
-  read_surroundings(world);
+  read_surroundings(world, period);
+  for (const Person& person : people_) {
+    const Way* way = way_to_[target_of(person)].get();
+    if (way != nullptr) way->field().prefetch(person.position);
+  }
   find_neighbours();
   find_walls(period);
   count_guests();

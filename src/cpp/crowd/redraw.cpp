@@ -122,7 +122,7 @@ void Crowd::begin_again(World& world, std::size_t i, Vec position) {
 
 Id Crowd::redraw(World& world) {
   read_people(world);
-  read_surroundings(world);
+  read_surroundings(world, 0.0);
   std::vector<Spot> taken;
   for (const Person& person : people_) {
     if (!person.is_redrawn) taken.push_back({person.position, person.radius});
@@ -144,7 +144,7 @@ Id Crowd::redraw(World& world) {
       begin_again(world, people[route][k], spots[route][k].position);
     }
   }
-  for (Signal& signal : signals_) signal = {};
+  signals_.clear();
   return 0;
 }
 

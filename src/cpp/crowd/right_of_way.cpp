@@ -4,14 +4,13 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
+#include <utility>
 
 #include "crowd/crowd.h"
 
 namespace flatland::crowd {
 namespace {
 
-constexpr double kApproach = 4.0;    // distance within which people approach a door [m]
 constexpr double kAhead = 0.5;       // least cosine of the angle between the way and the door
 constexpr double kThrough = 0.3;     // least cosine of the angle between the way and the axis
 constexpr double kThreshold = 0.35;  // space on both sides that belongs to the passage [m]
@@ -28,21 +27,42 @@ constexpr double kMostTurn = 0.5;  // tangent of the greatest angle by which peo
 
 }  // namespace
 
-bool Crowd::approaches(std::size_t i, const Choice& choice, std::size_t gate, Approach& approach) {
+// Appends the doors that person i approaches or passes.
+void Crowd::find_approaches(std::size_t i, const Choice& choice, std::vector<Approach>& found) {
   const Person& person = people_[i];
-  const Gate& g = ways_->gates()[gate];
-  const Vec offset = person.position - g.center;
-  const double along = dot(offset, g.axis);
-  const bool is_inside = std::fabs(along) < g.half_depth + kThreshold &&
-                         std::fabs(cross(g.axis, offset)) < g.half_width;
-  const bool is_ahead = dot(choice.direction, -offset) > kAhead * length(offset);
-  if (!is_inside && !is_ahead) return false;
-  // The way is taken at the center: next to a door post, the way may lead in any direction.
-  const double cosine = dot(way_of(target_of(person))->from_gate(gate), g.axis);
-  if (std::fabs(cosine) < kThrough) return false;
-  approach = {i, gate, cosine > 0.0 ? 1 : 0, is_inside};
-  if (is_inside) return true;
-  return cosine * along < 0.0 && surroundings_.walls().is_clear(person.position, g.center);
+  const std::vector<Gate>& gates = ways_->gates();
+  const SegmentGrid::Indices near = ways_->gates_near(person.position);
+  const std::size_t before = found.size();
+  found.resize(before + near.size());
+  // As in Walls::find_near, without branches: a door that is not approached is replaced by the next
+  // one.
+  Approach* end = found.data() + before;
+  for (const std::uint32_t k : near) {
+    const Gate& gate = gates[k];
+    const Vec offset = person.position - gate.center;
+    const double distance2 = square(offset);
+    const double ahead = -dot(choice.direction, offset);
+    const bool is_near = distance2 <= kGateReach * kGateReach;
+    const bool is_ahead = ahead * std::fabs(ahead) > kAhead * kAhead * distance2;
+    const bool is_along = std::fabs(dot(offset, gate.axis)) < gate.half_depth + kThreshold;
+    const bool is_inside = is_along & (std::fabs(cross(gate.axis, offset)) < gate.half_width);
+    *end = {i, k, 0, is_inside, distance2};
+    end += static_cast<std::ptrdiff_t>(is_near & (is_ahead | is_inside));
+  }
+  const Way& way = *way_of(target_of(person));
+  Approach* kept = found.data() + before;
+  for (const Approach* each = kept; each != end; ++each) {
+    const Gate& gate = gates[each->gate];
+    // The way is taken at the center: next to a door post, the way may lead in any direction.
+    const double cosine = dot(way.from_gate(each->gate), gate.axis);
+    if (std::fabs(cosine) < kThrough) continue;
+    const bool is_before = cosine * dot(person.position - gate.center, gate.axis) < 0.0;
+    if (each->is_inside ||
+        (is_before && surroundings_.walls().is_clear(person.position, gate.center))) {
+      *kept++ = {i, each->gate, cosine > 0.0 ? 1 : 0, each->is_inside, std::sqrt(each->distance)};
+    }
+  }
+  found.resize(static_cast<std::size_t>(kept - found.data()));
 }
 
 Crowd::Choice Crowd::step_aside(const Person& person, const Choice& choice,
@@ -61,39 +81,45 @@ Crowd::Choice Crowd::step_aside(const Person& person, const Choice& choice,
   return {distance > kWait ? choice.velocity : Vec{}, choice.direction, true};
 }
 
+Signal Crowd::signal_of(std::uint32_t gate) const {
+  const auto found = std::lower_bound(
+      signals_.begin(), signals_.end(), gate,
+      [](const Signal& signal, std::uint32_t index) { return signal.gate < index; });
+  return found != signals_.end() && found->gate == gate ? *found : Signal{gate};
+}
+
+void Crowd::update_signals(std::vector<Approach> approaching, std::int64_t step, double dt) {
+  std::sort(approaching.begin(), approaching.end(),
+            [](const Approach& a, const Approach& b) { return a.gate < b.gate; });
+  std::vector<Signal> signals;
+  for (auto each = approaching.begin(); each != approaching.end();) {
+    Signal signal = signal_of(each->gate);
+    Demand demand;
+    for (; each != approaching.end() && each->gate == signal.gate; ++each) {
+      const int direction = each->direction;
+      if (each->is_inside) {
+        ++demand.inside[direction];
+      } else {
+        ++demand.waiting[direction];
+        demand.nearest[direction] = std::min(demand.nearest[direction], each->distance);
+      }
+    }
+    signal.update(demand, step, dt);
+    signals.push_back(signal);
+  }
+  signals_ = std::move(signals);
+}
+
 void Crowd::keep_doors_clear(std::vector<Choice>& choices, std::int64_t step, double dt) {
   if (ways_ == nullptr || ways_->gates().empty()) return;
-  const std::vector<Gate>& gates = ways_->gates();
-  std::vector<Demand> demands(gates.size());
-  for (Demand& demand : demands) {
-    for (double& nearest : demand.nearest) nearest = std::numeric_limits<double>::infinity();
-  }
   std::vector<Approach> approaching;
   for (std::size_t i = 0; i < people_.size(); ++i) {
     if (stance_of(people_[i], choices[i]) != Stance::kWalking) continue;
-    const double x = people_[i].position.x;
-    const auto first =
-        std::lower_bound(gates.begin(), gates.end(), x - kApproach,
-                         [](const Gate& gate, double least) { return gate.center.x < least; });
-    for (auto gate = first; gate != gates.end() && gate->center.x <= x + kApproach; ++gate) {
-      if (square(people_[i].position - gate->center) > kApproach * kApproach) continue;
-      Approach approach;
-      const auto index = static_cast<std::size_t>(gate - gates.begin());
-      if (!approaches(i, choices[i], index, approach)) continue;
-      approaching.push_back(approach);
-      Demand& demand = demands[index];
-      if (approach.is_inside) {
-        ++demand.inside[approach.direction];
-      } else {
-        ++demand.waiting[approach.direction];
-        demand.nearest[approach.direction] = std::min(demand.nearest[approach.direction],
-                                                      length(people_[i].position - gate->center));
-      }
-    }
+    find_approaches(i, choices[i], approaching);
   }
-  for (std::size_t k = 0; k < gates.size(); ++k) signals_[k].update(demands[k], step, dt);
+  update_signals(approaching, step, dt);
   for (const Approach& approach : approaching) {
-    const Signal& signal = signals_[approach.gate];
+    const Signal signal = signal_of(approach.gate);
     const bool is_open =
         signal.direction == approach.direction && (approach.is_inside || !signal.is_closing);
     if (is_open || choices[approach.person].is_held) continue;

@@ -68,7 +68,7 @@ bool Surroundings::counts(const b2Fixture& fixture) const {
   return !fixture.IsSensor() && (filter.categoryBits & bits_) != 0 && filter.maskBits != 0;
 }
 
-bool Surroundings::read(const b2World& engine, const std::unordered_set<Id>& own) {
+bool Surroundings::read(const b2World& engine, const std::unordered_set<Id>& own, double reach) {
   std::vector<Key> keys;
   std::vector<const b2Body*> fixed;
   obstacles_.clear();
@@ -83,10 +83,10 @@ bool Surroundings::read(const b2World& engine, const std::unordered_set<Id>& own
       add_obstacles(*body);
     }
   }
-  if (keys == keys_) return false;
+  if (keys == keys_ && reach <= walls_->reach()) return false;
   std::vector<Segment> segments;
   for (const b2Body* body : fixed) add_segments(*body, segments);
-  walls_ = std::make_shared<const Walls>(std::move(segments));
+  walls_ = std::make_shared<const Walls>(std::move(segments), reach);
   keys_ = std::move(keys);
   return true;
 }

@@ -37,8 +37,9 @@ class Surroundings {
   // Considers only fixtures that collide and have one of the category bits.
   explicit Surroundings(std::uint16_t bits = 0) : bits_(bits) {}
 
-  // Reads all bodies except `own`. Returns whether the walls have changed.
-  bool read(const b2World& engine, const std::unordered_set<Id>& own);
+  // Reads all bodies except `own`. `reach` is the greatest range of queries of the walls [m].
+  // Returns whether the walls have changed or were read for a smaller reach before.
+  bool read(const b2World& engine, const std::unordered_set<Id>& own, double reach);
 
   const Walls& walls() const { return *walls_; }
   std::shared_ptr<const Walls> shared_walls() const { return walls_; }
@@ -59,7 +60,7 @@ class Surroundings {
 
   std::uint16_t bits_;
   std::vector<Key> keys_;
-  std::shared_ptr<const Walls> walls_ = std::make_shared<const Walls>(std::vector<Segment>{});
+  std::shared_ptr<const Walls> walls_ = std::make_shared<const Walls>(std::vector<Segment>{}, 0.0);
   std::vector<Obstacle> obstacles_;
 };
 

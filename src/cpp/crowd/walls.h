@@ -1,38 +1,28 @@
-// The walls of a world, in a grid of cells for queries about a neighbourhood.
+// The walls of a world, for queries about a neighbourhood.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <vector>
 
+#include "crowd/segment_grid.h"
 #include "vec.h"
 
 namespace flatland::crowd {
-
-struct Segment {
-  Vec a, b;
-};
-
-// Returns the point of a segment that is nearest to p.
-Vec nearest_on(const Segment& segment, Vec p);
 
 struct NearPoint {
   Vec point;
   double distance = 0.0;
 };
 
-// Returns the size of the cells of a grid over an area: the wanted size, or a greater size if there
-// would be more than four million cells.
-double cell_size(Vec area, double wanted);
-
 // Immutable, so that copies of a crowd share it.
 class Walls {
  public:
-  explicit Walls(std::vector<Segment> segments);
+  // `reach` is the greatest range of queries [m].
+  Walls(std::vector<Segment> segments, double reach);
 
   bool empty() const { return segments_.empty(); }
-  Vec low() const { return low_; }
-  Vec high() const { return high_; }
+  Vec low() const { return near_.low(); }
+  Vec high() const { return near_.high(); }
+  double reach() const { return near_.reach(); }
 
   // Appends the nearest points of all segments within a range.
   void find_near(Vec p, double range, std::vector<NearPoint>& found) const;
@@ -42,27 +32,9 @@ class Walls {
   bool is_clear(Vec from, Vec to) const;
 
  private:
-  // A segment in a cell. The members of all cells of a row are contiguous.
-  struct Member {
-    Segment segment;
-    std::int64_t column = 0;
-  };
-
-  template <typename Visit>
-  void visit_cells(Vec low, Vec high, Visit&& visit) const;
-  std::int64_t column_of(double x) const;
-  std::int64_t row_of(double y) const;
-
   std::vector<Segment> segments_;
-  Vec low_, high_;
-  double cell_ = 1.0;
-  std::int64_t columns_ = 0, rows_ = 0;
-  // Visits the members of the cells of a row, from one column to another one.
-  template <typename Visit>
-  void visit_members(std::int64_t row, std::int64_t first, std::int64_t last, Visit&& visit) const;
-
-  std::vector<std::uint32_t> starts_;  // index of the first entry of each cell in `members_`
-  std::vector<Member> members_;        // cell by cell
+  SegmentGrid near_;     // within `reach` of each cell
+  SegmentGrid crossed_;  // that cross each cell
 };
 
 // Reduces the nearest points of segments to one point for each side on which there is a wall: keeps

@@ -1,8 +1,22 @@
 #include "crowd/ways.h"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace flatland::crowd {
+namespace {
+
+SegmentGrid grid_of(const std::vector<Gate>& gates) {
+  constexpr double kCell = 1.0;  // m
+  std::vector<Segment> centers;
+  std::transform(gates.begin(), gates.end(), std::back_inserter(centers), [](const Gate& gate) {
+    return Segment{gate.center, gate.center};
+  });
+  return {centers, kCell, kGateReach};
+}
+
+}  // namespace
 
 Way::Way(const FreeGrid& grid, std::shared_ptr<const Walls> walls, const std::vector<Gate>& gates,
          const Place& place)
@@ -20,7 +34,10 @@ Vec Way::from(Vec p) const {
 }
 
 Ways::Ways(FreeGrid grid, std::shared_ptr<const Walls> walls)
-    : grid_(std::move(grid)), walls_(std::move(walls)), gates_(find_gates(grid_, *walls_)) {}
+    : grid_(std::move(grid)),
+      walls_(std::move(walls)),
+      gates_(find_gates(grid_, *walls_)),
+      gate_grid_(grid_of(gates_)) {}
 
 std::shared_ptr<const Way> Ways::to(const Place& place) {
   Entry* entry = nullptr;

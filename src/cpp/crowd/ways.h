@@ -45,6 +45,9 @@ class Ways {
 
   const FreeGrid& grid() const { return grid_; }
   const std::vector<Gate>& gates() const { return gates_; }
+  // Returns the indices of all gates within a distance of `kGateReach` of a point, in ascending
+  // order, and of few others.
+  SegmentGrid::Indices gates_near(Vec p) const { return gate_grid_.near(p); }
   std::shared_ptr<const Way> to(const Place& place);
   // Returns a way that is not kept.
   std::shared_ptr<const Way> to_temporary(const Place& place) const;
@@ -60,6 +63,7 @@ class Ways {
   const FreeGrid grid_;
   const std::shared_ptr<const Walls> walls_;
   const std::vector<Gate> gates_;
+  const SegmentGrid gate_grid_;
   std::mutex mutex_;
   std::map<Key, Entry> entries_;  // by the numbers of the place
 };

@@ -1,0 +1,88 @@
+// Segments in a grid of square cells, for queries about a neighbourhood.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "vec.h"
+
+namespace flatland::crowd {
+
+struct Segment {
+  Vec a, b;
+};
+
+// Returns the point of a segment that is nearest to p.
+inline Vec nearest_on(const Segment& segment, Vec p) {
+  const Vec along = segment.b - segment.a;
+  const double t = dot(p - segment.a, along) / square(along);
+  // The greater one of t and 0, which compilers make a branch of std::max. For a segment of length
+  // 0, t is NaN, of which std::min makes 1.
+  const double positive = 0.5 * (t + std::fabs(t));
+  return segment.a + std::min(1.0, positive) * along;
+}
+
+// Returns the size of the cells of a grid over an area: the wanted size, or a greater size if there
+// would be more than four million cells.
+double cell_size(Vec area, double wanted);
+
+// The list of a cell contains the indices of all segments within a reach of any point of the cell,
+// in ascending order, and few others. Immutable.
+class SegmentGrid {
+ public:
+  // Indices of segments, in one cell or in several ones.
+  struct Indices {
+    const std::uint32_t* first;
+    const std::uint32_t* last;
+
+    const std::uint32_t* begin() const { return first; }
+    const std::uint32_t* end() const { return last; }
+    std::size_t size() const { return static_cast<std::size_t>(last - first); }
+  };
+
+  SegmentGrid() : starts_(2, 0) {}
+  SegmentGrid(const std::vector<Segment>& segments, double cell, double reach);
+
+  Vec low() const { return low_; }
+  Vec high() const { return high_; }
+  double cell() const { return cell_; }
+  double reach() const { return reach_; }
+  std::int64_t rows() const { return rows_; }
+  // A point outside of the grid is in the nearest cell of the border, which is near the same
+  // segments.
+  std::int64_t column_of(double x) const { return index((x - low_.x) / cell_, columns_); }
+  std::int64_t row_of(double y) const { return index((y - low_.y) / cell_, rows_); }
+
+  // Returns the segments near a point.
+  Indices near(Vec p) const {
+    const std::int64_t column = column_of(p.x);
+    return in_row(row_of(p.y), column, column);
+  }
+  // Returns the segments near some cells of a row, a segment once for each of these cells.
+  Indices in_row(std::int64_t row, std::int64_t first_column, std::int64_t last_column) const {
+    const auto first = static_cast<std::size_t>(row * columns_ + first_column);
+    const auto last = static_cast<std::size_t>(row * columns_ + last_column);
+    return {indices_.data() + starts_[first], indices_.data() + starts_[last + 1]};
+  }
+
+ private:
+  static std::int64_t index(double coordinate, std::int64_t count) {
+    return static_cast<std::int64_t>(
+        std::min(std::max(0.0, coordinate), static_cast<double>(count - 1)));
+  }
+
+  template <typename Visit>
+  void each_near(const std::vector<Segment>& segments, Visit&& visit) const;
+
+  Vec low_, high_;
+  double cell_ = 1.0;
+  double reach_ = 0.0;
+  std::int64_t columns_ = 1, rows_ = 1;
+  std::vector<std::uint32_t> starts_;  // index of the first entry of each cell in `indices_`
+  std::vector<std::uint32_t> indices_;
+};
+
+}  // namespace flatland::crowd
