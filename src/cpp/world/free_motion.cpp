@@ -76,11 +76,10 @@ bool stays_awake(b2Body& body, FreeState& state, float dt, int position_iteratio
 // Returns the box of a fixture in the broad phase after a move, as in b2DynamicTree::MoveProxy.
 b2AABB fat_box(const b2AABB& box, b2Vec2 displacement) {
   const b2Vec2 margin(b2_aabbExtension, b2_aabbExtension);
-  b2AABB moved{box.lowerBound - margin, box.upperBound + margin};
   const b2Vec2 ahead = b2_aabbMultiplier * displacement;
-  (ahead.x < 0.0F ? moved.lowerBound : moved.upperBound).x += ahead.x;
-  (ahead.y < 0.0F ? moved.lowerBound : moved.upperBound).y += ahead.y;
-  return moved;
+  const b2Vec2 nothing(0.0F, 0.0F);
+  return {box.lowerBound - margin + b2Min(ahead, nothing),
+          box.upperBound + margin + b2Max(ahead, nothing)};
 }
 
 // Returns whether the broad phase keeps the box of a fixture, as in b2DynamicTree::MoveProxy.
@@ -257,15 +256,14 @@ bool FreeMotion::begin(b2World& world, float dt, int position_iterations) {
   for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
     if (body->GetType() == b2_dynamicBody) dynamic_.push_back(body);
     if (!is_moving(*body)) continue;
-    Move move;
-    if (!plan(*body, broad_phase, dt, position_iterations, move)) {
-      is_all = false;
-    } else if (move.are_kept) {
+    Move& move = leaving_.emplace_back();
+    const bool is_free = plan(*body, broad_phase, dt, position_iterations, move);
+    if (is_free && move.are_kept) {
       carry_out(move, broad_phase);
       moved_.push_back(body);
-    } else {
-      leaving_.push_back(move);
     }
+    if (!is_free || move.are_kept) leaving_.pop_back();
+    is_all = is_all && is_free;
   }
   // The broad phase depends on the order in which boxes move. It is that of Box2D if all bodies are
   // free, since those above have moved no box.

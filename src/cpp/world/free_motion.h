@@ -42,6 +42,8 @@ struct MovedBox {
 
 // The motion of a free body in a step.
 struct Move {
+  Move() {}  // does not initialize the boxes, which are many
+
   b2Body* body = nullptr;
   FreeState state;
   b2Transform to;
