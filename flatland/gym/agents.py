@@ -21,6 +21,7 @@ from flatland.plugins.ackermann_drive import AckermannDrive
 from flatland.plugins.diff_drive import DiffDrive
 from flatland.plugins.laser import Laser
 from flatland.plugins.omni_drive import OmniDrive
+from flatland.plugins.pedestrians import Pedestrians
 from flatland.plugins.tricycle_drive import TricycleDrive
 from flatland.values import Twist
 
@@ -28,9 +29,11 @@ if TYPE_CHECKING:
     from flatland.world import World
 
 
-# Subclasses of these, and of Laser, may do something else with a command or in their first update.
+# Subclasses of these, of Laser and of Pedestrians may do something else with a command or in their
+# first update.
 _DRIVES = (AckermannDrive, DiffDrive, OmniDrive, TricycleDrive)
 _STEERED = (AckermannDrive, TricycleDrive)
+_IDLE_UNLESS_WANTED = (Laser, Pedestrians, *_DRIVES)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +72,9 @@ class Agent:
 
 
 def omit_first_calls(agents: Iterable[Agent]) -> None:
-    """Makes the core perform the first updates of lasers and drives, too, if nothing wants them.
+    """Makes the core perform the first updates, too, if nothing wants them.
+
+    This concerns the lasers and drives of the agents, and people.
 
     The results are the same; an episode begins without calls of Python.
 
@@ -77,7 +82,8 @@ def omit_first_calls(agents: Iterable[Agent]) -> None:
         agents: Agents, the worlds of which have not been stepped.
     """
     for agent in agents:
-        known = [plugin for plugin in agent.model.plugins if type(plugin) in (Laser, *_DRIVES)]
+        plugins = (*agent.model.plugins, *agent.world.plugins)
+        known = [plugin for plugin in plugins if type(plugin) in _IDLE_UNLESS_WANTED]
         agent.world.plugin_host.jobs.omit_first_calls(known)
 
 

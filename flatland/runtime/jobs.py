@@ -142,14 +142,14 @@ class Jobs:
     def omit_first_calls(self, plugins: Container[FlatlandPlugin]) -> None:
         """Treats the first updates of plugins like later ones, which are called only if wanted.
 
-        To be called before the first step, for plugins whose functions only account for an update
-        that is not wanted, as `skipped` does.
+        To be called before the first step, for plugins whose functions do for an update that is
+        not wanted what `skipped` does, or nothing.
 
         Args:
-            plugins: The plugins; their updates without `skipped` are not changed.
+            plugins: The plugins.
         """
         for job in self._jobs.values():
-            if job.plugin in plugins and job.update.skipped is not None:
+            if job.plugin in plugins:
                 job.was_called = True
 
     @property
