@@ -73,39 +73,61 @@ bool stays_awake(b2Body& body, FreeState& state, float dt, int position_iteratio
   return state.sleep_time < b2_timeToSleep || position_iterations < 1;
 }
 
-// Returns the box of a fixture in the broad phase after a move, as in b2DynamicTree::MoveProxy.
-b2AABB fat_box(const b2AABB& box, b2Vec2 displacement) {
-  const b2Vec2 margin(b2_aabbExtension, b2_aabbExtension);
-  const b2Vec2 ahead = b2_aabbMultiplier * displacement;
-  const b2Vec2 nothing(0.0F, 0.0F);
-  return {box.lowerBound - margin + b2Min(ahead, nothing),
-          box.upperBound + margin + b2Max(ahead, nothing)};
+// The sides of a box: its lower bounds and its negative upper bounds. All sides of a larger box are
+// less, so that each operation on boxes is one on vectors. The results are those of Box2D, since
+// rounding is symmetric.
+using Sides = float __attribute__((vector_size(16)));
+using SideMask = std::int32_t __attribute__((vector_size(16)));
+
+constexpr Sides kSigns = {1.0F, 1.0F, -1.0F, -1.0F};
+constexpr Sides kFatMargin = {b2_aabbExtension, b2_aabbExtension, b2_aabbExtension,
+                              b2_aabbExtension};
+
+Sides sides_of(const b2AABB& box) {
+  static_assert(sizeof(b2AABB) == sizeof(Sides));
+  return __builtin_bit_cast(Sides, box) * kSigns;
 }
 
-// Returns whether the broad phase keeps the box of a fixture, as in b2DynamicTree::MoveProxy.
-bool keeps_box(const b2AABB& kept, const b2AABB& box, b2Vec2 displacement) {
-  if (!kept.Contains(box)) return false;
-  const b2Vec2 margin(b2_aabbExtension, b2_aabbExtension);
-  b2AABB largest = fat_box(box, displacement);
-  largest.lowerBound = largest.lowerBound - 4.0F * margin;
-  largest.upperBound = largest.upperBound + 4.0F * margin;
-  return largest.Contains(kept);
+b2AABB box_of(Sides sides) { return __builtin_bit_cast(b2AABB, sides * kSigns); }
+
+Sides least(Sides a, Sides b) { return a < b ? a : b; }
+
+bool is_true(SideMask mask) {
+  using Halves = std::int64_t __attribute__((vector_size(16)));
+  const auto halves = __builtin_bit_cast(Halves, mask);
+  return (halves[0] & halves[1]) == -1;
 }
 
-// Returns the box of a shape. That of a circle, as many robots and all people are, does not need
-// the call of a library.
-b2AABB box_of(const b2Shape& shape, const b2Transform& transform, int32 child) {
-  b2AABB box;
+// Returns the sides of the box of a shape. That of a circle, as many robots and all people are,
+// does not need the call of a library.
+Sides sides_of(const b2Shape& shape, const b2Transform& transform, int32 child) {
   if (shape.GetType() == b2Shape::e_circle) {
     const auto& circle = static_cast<const b2CircleShape&>(shape);
     const b2Vec2 center = transform.p + b2Mul(transform.q, circle.m_p);
-    const b2Vec2 radius(circle.m_radius, circle.m_radius);
-    box.lowerBound = center - radius;
-    box.upperBound = center + radius;
-  } else {
-    shape.ComputeAABB(&box, transform, child);
+    return Sides{center.x, center.y, -center.x, -center.y} - circle.m_radius;
   }
-  return box;
+  b2AABB box;
+  shape.ComputeAABB(&box, transform, child);
+  return sides_of(box);
+}
+
+// Returns the center of a box, and its negative.
+Sides center_of(Sides sides) {
+  const Sides opposite = {sides[2], sides[3], sides[0], sides[1]};
+  return 0.5F * (sides - opposite);
+}
+
+// Returns the box of a fixture in the broad phase after a move, as in b2DynamicTree::MoveProxy. The
+// displacement is that of all sides.
+Sides fat_box(Sides box, Sides displacement) {
+  return box - kFatMargin + least(b2_aabbMultiplier * displacement, Sides{});
+}
+
+// Returns whether the broad phase keeps the box of a fixture, as in b2DynamicTree::MoveProxy.
+bool keeps_box(const b2AABB& kept_box, Sides box, Sides displacement) {
+  const Sides kept = sides_of(kept_box);
+  const Sides largest = fat_box(box, displacement) - 4.0F * kFatMargin;
+  return is_true((kept <= box) & (largest <= kept));
 }
 
 // Computes the boxes that the fixtures sweep. Returns false if there are too many.
@@ -115,15 +137,12 @@ bool sweep_boxes(b2Body& body, const b2BroadPhase& broad_phase, const b2Transfor
   for (b2Fixture* f = body.GetFixtureList(); f != nullptr; f = f->GetNext()) {
     if (move.count == kMostFixtures || get<members::FixtureProxyCount>(*f) != 1) return false;
     b2FixtureProxy* proxy = get<members::FixtureProxies>(*f);
-    const b2AABB before = box_of(*f->GetShape(), from, proxy->childIndex);
-    const b2AABB after = box_of(*f->GetShape(), move.to, proxy->childIndex);
-    MovedBox& each = move.boxes[move.count++];
-    each.proxy = proxy;
-    each.box.Combine(before, after);
-    each.displacement = after.GetCenter() - before.GetCenter();
-    if (!keeps_box(tree.GetFatAABB(proxy->proxyId), each.box, each.displacement)) {
-      move.are_kept = false;
-    }
+    const Sides before = sides_of(*f->GetShape(), from, proxy->childIndex);
+    const Sides after = sides_of(*f->GetShape(), move.to, proxy->childIndex);
+    const Sides swept = least(before, after);
+    const Sides displacement = center_of(after) - center_of(before);
+    if (!keeps_box(tree.GetFatAABB(proxy->proxyId), swept, displacement)) move.are_kept = false;
+    move.boxes[move.count++] = {proxy, box_of(swept), {displacement[0], displacement[1]}};
   }
   return true;
 }
@@ -205,7 +224,9 @@ bool meets(const Move& move, const std::vector<b2Body*>& bodies, const b2BroadPh
                        });
   };
   for (std::size_t i = 0; i < move.count; ++i) {
-    const b2AABB box = fat_box(move.boxes[i].box, move.boxes[i].displacement);
+    const b2Vec2 moved = move.boxes[i].displacement;
+    const b2AABB box =
+        box_of(fat_box(sides_of(move.boxes[i].box), Sides{moved.x, moved.y, -moved.x, -moved.y}));
     for (b2Body* body : bodies) {
       for (b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) {
         if (overlaps(*f, box)) return true;

@@ -104,16 +104,17 @@ void StepGuard::begin(b2World& world, float dt) {
   for (const b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
     const auto slot = static_cast<std::uint32_t>(id_of(body));
     if (slot >= starts_.size()) starts_.resize(slot + 1);
+    if (body->GetType() == b2_kinematicBody) continue;
     Start& start = starts_[slot];
-    if (start.last_jam + 1 != step_) start.jammed_steps = 0;
     if (is_dynamic(body)) {
+      if (start.last_jam + 1 != step_) start.jammed_steps = 0;
       mass += body->GetMass();
       // This step starts from impulses of the previous step, whose energy is therefore allowed,
       // too.
       const double earlier = start.energy;
       start.energy = energy_of(body, dt * start.acceleration, dt * start.angular_acceleration);
       start.allowed = std::max(start.energy, earlier);
-    } else if (body->GetType() == b2_staticBody) {
+    } else {
       start.position = body->GetPosition();
       start.angle = body->GetAngle();
     }
