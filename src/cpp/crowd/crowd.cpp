@@ -79,6 +79,8 @@ void Crowd::add_party(std::uint32_t route, std::uint32_t first_leg,
       if (leg != 0) own_.insert(leg);
     }
     people_.push_back(person);
+    // Now rather than in the first update, so that copies of the crowd share the result.
+    surroundings_.extend(wall_range(person, 0.0));
   }
   parties_.push_back(std::move(party));
 }
@@ -136,13 +138,13 @@ bool Crowd::is_standing(const Person& person) const {
 }
 
 std::size_t Crowd::reach_of(World& world, std::uint32_t waypoint) {
-  read_surroundings(world, 0.0);
+  read_surroundings(world);
   const Way* way = way_of(waypoint);
   return way == nullptr ? 1 : way->field().reached();
 }
 
 Vec Crowd::way_from(World& world, std::uint32_t waypoint, Vec place) {
-  read_surroundings(world, 0.0);
+  read_surroundings(world);
   const Way* way = way_of(waypoint);
   return way == nullptr ? unit(waypoints_[waypoint].place.nearest(place) - place, {1.0, 0.0})
                         : way->field().direction(place, surroundings_.walls());
@@ -177,10 +179,8 @@ std::vector<double> Crowd::state() const {
   return numbers;
 }
 
-void Crowd::read_surroundings(const World& world, double period) {
-  double reach = std::max({kGateWidth, FreeGrid::range(settings_.clearance), settings_.leg_radius});
-  for (const Person& person : people_) reach = std::max(reach, wall_range(person, period));
-  if (surroundings_.read(world.engine(), own_, reach)) has_grid_ = false;
+void Crowd::read_surroundings(const World& world) {
+  if (surroundings_.read(world.engine(), own_)) has_grid_ = false;
   if (has_grid_) return;
   has_grid_ = true;
   for (auto& way : way_to_) way.reset();

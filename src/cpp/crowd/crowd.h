@@ -15,6 +15,7 @@
 // half_planes (the models), gait (legs), random.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -37,7 +38,12 @@ namespace crowd {
 class Crowd {
  public:
   Crowd() : Crowd(Settings{}) {}
-  explicit Crowd(const Settings& settings) : settings_(settings), surroundings_(settings.bits) {}
+  explicit Crowd(const Settings& settings)
+      : settings_(settings),
+        force_sight_(crowd::wall_sight(settings.forces)),
+        surroundings_(settings.bits) {
+    surroundings_.extend(std::max(FreeGrid::range(settings.clearance), settings.leg_radius));
+  }
 
   JobPlace place;
 
@@ -88,8 +94,7 @@ class Crowd {
   // everybody, kFixed (stopped or in a queue) to nobody.
   enum class Stance : std::uint8_t { kWalking, kIdle, kFixed };
 
-  // `period` is the time between two updates [s]; it may be 0 if nobody walks.
-  void read_surroundings(const World& world, double period);
+  void read_surroundings(const World& world);
   void read_people(World& world);
   // Null if the person was removed.
   const Person* numbered(std::uint32_t number) const;
@@ -148,8 +153,10 @@ class Crowd {
 
   // motion.cpp: how a person moves.
   void find_neighbours();
-  // Returns the range within which walls have an effect on a person.
-  static double wall_range(const Person& person, double period);
+  // Returns the gap below which walls have an effect on the velocity that a person wants.
+  double wall_sight(const Person& person) const;
+  // Returns the distance within which walls have an effect on the motion of a person.
+  double wall_range(const Person& person, double period) const;
   void find_walls(double period);
   // Appends the points of walls within a range of person i, at most that of `find_walls`.
   void add_walls(std::size_t i, double range, std::vector<NearPoint>& found) const;
@@ -161,6 +168,7 @@ class Crowd {
   void update(World& world, std::int64_t step, double dt);
 
   Settings settings_;
+  double force_sight_;  // gap below which walls repel people in the social force model [m]
   std::vector<Waypoint> waypoints_;
   std::vector<Route> routes_;
   std::vector<Party> parties_;

@@ -8,6 +8,7 @@
 namespace flatland::crowd {
 namespace {
 
+constexpr double kWidth = 1.35;      // greatest width of a passage [m]
 constexpr double kOpposite = -0.8;   // cosine of the angle between directions to opposite walls
 constexpr double kMostDepth = 3.0;   // greatest half of the length of a passage [m]
 constexpr double kMostOffset = 0.9;  // greatest distance of a cell from the axis of a passage [m]
@@ -25,7 +26,7 @@ struct Throat {
 // cross-section in this case.
 bool is_between(const Walls& walls, Vec p, std::vector<NearPoint>& near, Throat& throat) {
   near.clear();
-  walls.find_near(p, kGateWidth, near);
+  walls.find_near(p, kWidth, near);
   if (near.empty()) return false;
   const auto nearest =
       std::min_element(near.begin(), near.end(), [](const NearPoint& a, const NearPoint& b) {
@@ -33,7 +34,7 @@ bool is_between(const Walls& walls, Vec p, std::vector<NearPoint>& near, Throat&
                std::tie(b.distance, b.point.x, b.point.y);
       });
   const Vec direction = unit(nearest->point - p);
-  throat.width = kGateWidth;
+  throat.width = kWidth;
   for (const NearPoint& other : near) {
     if (dot(direction, unit(other.point - p)) > kOpposite) continue;
     const double width = length(other.point - nearest->point);
@@ -42,7 +43,7 @@ bool is_between(const Walls& walls, Vec p, std::vector<NearPoint>& near, Throat&
     throat.b = other.point;
     throat.width = width;
   }
-  return throat.width < kGateWidth;
+  return throat.width < kWidth;
 }
 
 // Returns the connected narrow cells that contain a first cell, and marks them by a width of 0.
@@ -76,10 +77,11 @@ std::vector<Throat> passage_from(std::size_t first, const FreeGrid& grid,
 
 std::vector<Gate> find_gates(const FreeGrid& grid, const Walls& walls) {
   std::vector<Throat> narrow(static_cast<std::size_t>(grid.columns() * grid.rows()));
+  const Walls within_width(walls.segments(), kWidth);
   std::vector<NearPoint> near;
   for (std::size_t i = 0; i < narrow.size(); ++i) {
     if (grid.slowness(i) <= 1.0F) continue;  // a disc does not fit, or all walls are far away
-    if (is_between(walls, grid.center(i), near, narrow[i])) {
+    if (is_between(within_width, grid.center(i), near, narrow[i])) {
       narrow[i].cell = i;
     } else {
       narrow[i].width = 0.0;

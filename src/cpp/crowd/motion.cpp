@@ -21,8 +21,6 @@ constexpr std::uint64_t kFluctuations = std::uint64_t{3} << 40U;
 constexpr double kSkin = 2e-4;              // gap that covers the rounding of single precision [m]
 constexpr double kParting = 0.5;            // greatest speed at which overlaps are resolved [m/s]
 constexpr double kRounding = 1e-6;          // bound of the rounding error of velocities [m/s]
-constexpr double kWallSight = 1.0;          // distance within which walls are considered [m]
-constexpr double kNegligible = 0.01;        // acceleration that is ignored [m/s²]
 constexpr double kMostSpeed = 1.3;          // greatest speed as a multiple of the preferred speed
 constexpr double kMostAcceleration = 20.0;  // greatest acceleration of a dynamic body [m/s²]
 constexpr double kTurning = 0.2;            // time constant of the heading [s]
@@ -73,8 +71,13 @@ void Crowd::find_neighbours() {
   }
 }
 
-double Crowd::wall_range(const Person& person, double period) {
-  return person.radius + std::max(kWallSight, kSkin + most_speed(person) * period);
+double Crowd::wall_sight(const Person& person) const {
+  return settings_.model == Settings::Model::kOrca ? settings_.wall_horizon * most_speed(person)
+                                                   : force_sight_;
+}
+
+double Crowd::wall_range(const Person& person, double period) const {
+  return person.radius + std::max(wall_sight(person), kSkin + most_speed(person) * period);
 }
 
 void Crowd::find_walls(double period) {
@@ -82,7 +85,9 @@ void Crowd::find_walls(double period) {
   near_wall_starts_.clear();
   for (const Person& person : people_) {
     near_wall_starts_.push_back(static_cast<std::uint32_t>(near_walls_.size()));
-    surroundings_.walls().find_near(person.position, wall_range(person, period), near_walls_);
+    const double range = wall_range(person, period);
+    surroundings_.extend(range);
+    surroundings_.walls().find_near(person.position, range, near_walls_);
   }
   near_wall_starts_.push_back(static_cast<std::uint32_t>(near_walls_.size()));
 }
@@ -124,7 +129,7 @@ Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, d
     sum += view_weight(forces, choice.direction, push) * push;
   }
   near_.clear();
-  add_walls(i, person.radius + kWallSight, near_);
+  add_walls(i, person.radius + wall_sight(person), near_);
   keep_sides(person.position, near_);
   for (const NearPoint& wall : near_) {
     sum += wall_repulsion(forces, person.position - wall.point, person.radius);
@@ -148,7 +153,7 @@ Vec Crowd::by_orca(std::size_t i, Vec preferred, double period) {
   constexpr double kMargin = 0.05;  // additional gap [m]
   planes_.clear();
   near_.clear();
-  add_walls(i, person.radius + kWallSight, near_);
+  add_walls(i, person.radius + wall_sight(person), near_);
   keep_sides(person.position, near_);
   for (const NearPoint& wall : near_) {
     planes_.push_back(keep_off(unit(person.position - wall.point, {1.0, 0.0}),
@@ -224,7 +229,7 @@ Vec Crowd::without_contact(std::size_t i, Vec velocity, double period) {
 void Crowd::update(World& world, std::int64_t step, double dt) {
   const double period = dt * static_cast<double>(settings_.interval);
   read_people(world);
-  read_surroundings(world, period);
+  read_surroundings(world);
   for (const Person& person : people_) {
     const Way* way = way_to_[target_of(person)].get();
     if (way != nullptr) way->field().prefetch(person.position);

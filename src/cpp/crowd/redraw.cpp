@@ -42,6 +42,7 @@ bool Crowd::is_free(const Spot& spot, const std::vector<Spot>& taken) const {
 bool Crowd::draw_spot(std::size_t i, const std::vector<Spot>& taken, Spot& spot) {
   const Person& person = people_[i];
   const Route& route = routes_[parties_[person.party].route];
+  surroundings_.extend(person.radius + kGap);
   Vec low = route.low;
   Vec high = route.high;
   const Walls& walls = surroundings_.walls();
@@ -122,7 +123,7 @@ void Crowd::begin_again(World& world, std::size_t i, Vec position) {
 
 Id Crowd::redraw(World& world) {
   read_people(world);
-  read_surroundings(world, 0.0);
+  read_surroundings(world);
   std::vector<Spot> taken;
   for (const Person& person : people_) {
     if (!person.is_redrawn) taken.push_back({person.position, person.radius});

@@ -11,13 +11,12 @@
 namespace flatland::crowd {
 namespace {
 
-constexpr double kAhead = 0.5;       // least cosine of the angle between the way and the door
-constexpr double kThrough = 0.3;     // least cosine of the angle between the way and the axis
-constexpr double kThreshold = 0.35;  // space on both sides that belongs to the passage [m]
-constexpr double kLane = 0.25;       // additional width of a lane on each side of the door [m]
-constexpr double kWait = 1.2;        // distance from the passage at which people wait [m]
-constexpr double kRetreat = 0.8;     // distance from the passage below which people step back [m]
-constexpr double kAside = 0.6;       // share of the preferred speed with which people step aside
+constexpr double kAhead = 0.5;    // least cosine of the angle between the way and the door
+constexpr double kThrough = 0.3;  // least cosine of the angle between the way and the axis
+constexpr double kLane = 0.25;    // additional width of a lane on each side of the door [m]
+constexpr double kWait = 1.2;     // distance from the passage at which people wait [m]
+constexpr double kRetreat = 0.8;  // distance from the passage below which people step back [m]
+constexpr double kAside = 0.6;    // share of the preferred speed with which people step aside
 
 constexpr double kView = 3.0;      // distance within which people are oncoming [m]
 constexpr double kLeft = 0.8;      // distance to the left of the way for the same [m]
@@ -44,7 +43,7 @@ void Crowd::find_approaches(std::size_t i, const Choice& choice, std::vector<App
     const double ahead = -dot(choice.direction, offset);
     const bool is_near = distance2 <= kGateReach * kGateReach;
     const bool is_ahead = ahead * std::fabs(ahead) > kAhead * kAhead * distance2;
-    const bool is_along = std::fabs(dot(offset, gate.axis)) < gate.half_depth + kThreshold;
+    const bool is_along = std::fabs(dot(offset, gate.axis)) < gate.half_length();
     const bool is_inside = is_along & (std::fabs(cross(gate.axis, offset)) < gate.half_width);
     *end = {i, k, 0, is_inside, distance2};
     end += static_cast<std::ptrdiff_t>(is_near & (is_ahead | is_inside));

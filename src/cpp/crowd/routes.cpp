@@ -150,25 +150,27 @@ Crowd::Choice Crowd::queue_up(Person& person, Party& party, std::uint32_t waypoi
 
 Crowd::Choice Crowd::choose(Person& person, std::int64_t step, double dt, double period) {
   Party& party = parties_[person.party];
-  const Vec facing{std::cos(person.heading), std::sin(person.heading)};
+  const auto stand = [&]() -> Choice {
+    return {{}, {std::cos(person.heading), std::sin(person.heading)}};
+  };
   if (party.is_waiting && step >= party.wait_until) {
     leave(party, routes_[party.route].waypoints[party.leg], step);
   }
-  if (person.is_stopped) return {{}, facing};
+  if (person.is_stopped) return stand();
   if (person.sent_to != kNone) {
     if (!has_arrived(person, person.sent_to)) return approach(person, person.sent_to);
     person.is_stopped = true;
-    return {{}, facing};
+    return stand();
   }
   const Route& route = routes_[party.route];
   if (person.stop_until != 0) {
-    if (step < person.stop_until) return {{}, facing};
+    if (step < person.stop_until) return stand();
     person.stop_until = 0;
   } else if (route.stop_interval > 0.0 && !party.is_waiting && !party.is_done) {
     const std::uint64_t stream = kStops + person.number;
     if (draw(person.draws, stream, {0.0, 1.0}) < period / route.stop_interval) {
       person.stop_until = step + steps(draw(person.draws, stream, route.stop), dt);
-      return {{}, facing};
+      return stand();
     }
   }
   // A person who wanders without progress turns to another place.
@@ -177,12 +179,12 @@ Crowd::Choice Crowd::choose(Person& person, std::int64_t step, double dt, double
   }
   const std::uint32_t waypoint = route.waypoints[party.leg];
   if (party.is_done) {
-    return has_arrived(person, waypoint) ? Choice{{}, facing} : approach(person, waypoint);
+    return has_arrived(person, waypoint) ? stand() : approach(person, waypoint);
   }
   if (waypoints_[waypoint].is_queue) return queue_up(person, party, waypoint, step, dt);
   if (has_arrived(person, waypoint)) {
     if (!party.is_waiting) arrive(party, waypoint, step, dt);
-    if (party.is_waiting || party.is_done) return {{}, facing};
+    if (party.is_waiting || party.is_done) return stand();
     return approach(person, route.waypoints[party.leg]);
   }
   return approach(person, waypoint);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 namespace flatland::crowd {
 
@@ -11,7 +13,8 @@ double cell_size(Vec area, double wanted) {
       {wanted, std::sqrt(area.x * area.y / kMostCells), std::max(area.x, area.y) / kMostCells});
 }
 
-SegmentGrid::SegmentGrid(const std::vector<Segment>& segments, double cell, double reach)
+SegmentGrid::SegmentGrid(const std::vector<Segment>& segments, double cell, double reach,
+                         const IsListed& is_listed)
     : reach_(reach) {
   if (!segments.empty()) low_ = high_ = segments[0].a;
   for (const Segment& segment : segments) {
@@ -22,37 +25,38 @@ SegmentGrid::SegmentGrid(const std::vector<Segment>& segments, double cell, doub
   }
   const Vec size = high_ - low_;
   cell_ = cell_size(size, cell);
-  columns_ = static_cast<std::int64_t>(size.x / cell_) + 1;
-  rows_ = static_cast<std::int64_t>(size.y / cell_) + 1;
-  // The first pass counts the segments near each cell, the second pass stores their indices.
+  per_metre_ = 1.0 / cell_;
+  columns_ = static_cast<std::int64_t>(size.x * per_metre_) + 1;
+  rows_ = static_cast<std::int64_t>(size.y * per_metre_) + 1;
   starts_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
-  each_near(segments, [&](std::size_t place, std::uint32_t) { ++starts_[place + 1]; });
-  for (std::size_t i = 1; i < starts_.size(); ++i) starts_[i] += starts_[i - 1];
-  indices_.resize(starts_.back());
-  std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
-  each_near(segments, [&](std::size_t place, std::uint32_t i) { indices_[next[place]++] = i; });
-}
-
-// Calls visit(cell, index) for each cell and each segment near it.
-template <typename Visit>
-void SegmentGrid::each_near(const std::vector<Segment>& segments, Visit&& visit) const {
-  const double reach = reach_ + 1e-6;  // m, including a rounding error
-  const double half_diagonal = 0.5 * std::sqrt(2.0) * cell_;
-  const double most = reach + half_diagonal * (1.0 + 1e-6);
+  std::vector<std::pair<std::size_t, std::uint32_t>> entries;  // cells and segments
+  constexpr double kRounding = 1e-6;                           // m
+  const double reach_of_cell = reach + kRounding;
+  const double reach_of_center = reach_of_cell + 0.5 * std::sqrt(2.0) * cell_;
   for (std::uint32_t i = 0; i < segments.size(); ++i) {
     const Segment& s = segments[i];
-    const std::int64_t first_column = column_of(std::min(s.a.x, s.b.x) - reach);
-    const std::int64_t last_column = column_of(std::max(s.a.x, s.b.x) + reach);
-    const std::int64_t last_row = row_of(std::max(s.a.y, s.b.y) + reach);
-    for (std::int64_t row = row_of(std::min(s.a.y, s.b.y) - reach); row <= last_row; ++row) {
+    const std::int64_t first_column = column_of(std::min(s.a.x, s.b.x) - reach_of_cell);
+    const std::int64_t last_column = column_of(std::max(s.a.x, s.b.x) + reach_of_cell);
+    const std::int64_t last_row = row_of(std::max(s.a.y, s.b.y) + reach_of_cell);
+    for (std::int64_t row = row_of(std::min(s.a.y, s.b.y) - reach_of_cell); row <= last_row;
+         ++row) {
       for (std::int64_t column = first_column; column <= last_column; ++column) {
-        const Vec center{low_.x + (static_cast<double>(column) + 0.5) * cell_,
-                         low_.y + (static_cast<double>(row) + 0.5) * cell_};
-        if (square(nearest_on(s, center) - center) > most * most) continue;
-        visit(static_cast<std::size_t>(row * columns_ + column), i);
+        const Vec corner =
+            low_ + cell_ * Vec{static_cast<double>(column), static_cast<double>(row)};
+        const Vec diagonal{cell_, cell_};
+        const Vec center = corner + 0.5 * diagonal;
+        if (length(nearest_on(s, center) - center) > reach_of_center) continue;
+        const Vec margin{kRounding, kRounding};
+        if (is_listed && !is_listed(i, corner - margin, corner + diagonal + margin)) continue;
+        entries.emplace_back(static_cast<std::size_t>(row * columns_ + column), i);
+        ++starts_[entries.back().first + 1];
       }
     }
   }
+  std::partial_sum(starts_.begin(), starts_.end(), starts_.begin());
+  indices_.resize(entries.size());
+  std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
+  for (const auto& [place, i] : entries) indices_[next[place]++] = i;
 }
 
 }  // namespace flatland::crowd

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "vec.h"
@@ -30,7 +31,7 @@ inline Vec nearest_on(const Segment& segment, Vec p) {
 double cell_size(Vec area, double wanted);
 
 // The list of a cell contains the indices of all segments within a reach of any point of the cell,
-// in ascending order, and few others. Immutable.
+// in ascending order, and few others, unless a condition excludes them. Immutable.
 class SegmentGrid {
  public:
   // Indices of segments, in one cell or in several ones.
@@ -44,7 +45,11 @@ class SegmentGrid {
   };
 
   SegmentGrid() : starts_(2, 0) {}
-  SegmentGrid(const std::vector<Segment>& segments, double cell, double reach);
+  // `is_listed(index, low, high)` returns whether the list of a cell, with these corners, may
+  // contain a segment that is near the cell; null if all lists may.
+  using IsListed = std::function<bool(std::uint32_t, Vec, Vec)>;
+  SegmentGrid(const std::vector<Segment>& segments, double cell, double reach,
+              const IsListed& is_listed = nullptr);
 
   Vec low() const { return low_; }
   Vec high() const { return high_; }
@@ -53,8 +58,8 @@ class SegmentGrid {
   std::int64_t rows() const { return rows_; }
   // A point outside of the grid is in the nearest cell of the border, which is near the same
   // segments.
-  std::int64_t column_of(double x) const { return index((x - low_.x) / cell_, columns_); }
-  std::int64_t row_of(double y) const { return index((y - low_.y) / cell_, rows_); }
+  std::int64_t column_of(double x) const { return index((x - low_.x) * per_metre_, columns_); }
+  std::int64_t row_of(double y) const { return index((y - low_.y) * per_metre_, rows_); }
 
   // Returns the segments near a point.
   Indices near(Vec p) const {
@@ -74,11 +79,9 @@ class SegmentGrid {
         std::min(std::max(0.0, coordinate), static_cast<double>(count - 1)));
   }
 
-  template <typename Visit>
-  void each_near(const std::vector<Segment>& segments, Visit&& visit) const;
-
   Vec low_, high_;
-  double cell_ = 1.0;
+  double cell_ = 1.0;       // size of a cell [m]
+  double per_metre_ = 1.0;  // 1 / `cell_`
   double reach_ = 0.0;
   std::int64_t columns_ = 1, rows_ = 1;
   std::vector<std::uint32_t> starts_;  // index of the first entry of each cell in `indices_`

@@ -45,6 +45,10 @@ Vec wall_repulsion(const SocialForces& forces, Vec offset, double radius) {
   return forces.wall_strength * std::exp(-std::max(gap, 0.0) / forces.wall_range) * unit(offset);
 }
 
+double wall_sight(const SocialForces& forces) {
+  return forces.wall_range * std::log(std::max(forces.wall_strength / kNegligible, 1.0));
+}
+
 Vec group_attraction(const SocialForces& forces, int size, Vec heading, Vec velocity,
                      Vec to_center) {
   Vec sum;

@@ -24,6 +24,8 @@ struct SocialForces {
   double spacing = 1.0;          // beta 3 of groups [m/s²]
 };
 
+inline constexpr double kNegligible = 0.01;  // acceleration that is ignored [m/s²]
+
 // Returns the acceleration towards a preferred velocity, (v0 e - v) / tau.
 Vec driving_acceleration(const SocialForces& forces, Vec preferred, Vec velocity);
 
@@ -41,6 +43,9 @@ double view_weight(const SocialForces& forces, Vec heading, Vec push);
 // the person. Measured from the center, the posts of a door of one metre would repel too strongly
 // to let anybody pass.
 Vec wall_repulsion(const SocialForces& forces, Vec offset, double radius);
+
+// Returns the gap beyond which this repulsion is negligible.
+double wall_sight(const SocialForces& forces);
 
 // Returns the accelerations in a group of `size` people that turn the gaze and hold the group
 // together. The first one slows a person down until all other members are in the field of view; the

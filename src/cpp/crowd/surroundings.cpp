@@ -68,7 +68,7 @@ bool Surroundings::counts(const b2Fixture& fixture) const {
   return !fixture.IsSensor() && (filter.categoryBits & bits_) != 0 && filter.maskBits != 0;
 }
 
-bool Surroundings::read(const b2World& engine, const std::unordered_set<Id>& own, double reach) {
+bool Surroundings::read(const b2World& engine, const std::unordered_set<Id>& own) {
   std::vector<Key> keys;
   std::vector<const b2Body*> fixed;
   obstacles_.clear();
@@ -83,12 +83,18 @@ bool Surroundings::read(const b2World& engine, const std::unordered_set<Id>& own
       add_obstacles(*body);
     }
   }
-  if (keys == keys_ && reach <= walls_->reach()) return false;
+  if (keys == keys_) return false;
   std::vector<Segment> segments;
   for (const b2Body* body : fixed) add_segments(*body, segments);
-  walls_ = std::make_shared<const Walls>(std::move(segments), reach);
+  walls_ = std::make_shared<const Walls>(std::move(segments), walls_->reach());
   keys_ = std::move(keys);
   return true;
+}
+
+void Surroundings::extend(double reach) {
+  if (reach > walls_->reach()) {
+    walls_ = std::make_shared<const Walls>(walls_->segments(), reach);
+  }
 }
 
 void Surroundings::add_segments(const b2Body& body, std::vector<Segment>& segments) const {

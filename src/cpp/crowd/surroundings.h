@@ -37,9 +37,10 @@ class Surroundings {
   // Considers only fixtures that collide and have one of the category bits.
   explicit Surroundings(std::uint16_t bits = 0) : bits_(bits) {}
 
-  // Reads all bodies except `own`. `reach` is the greatest range of queries of the walls [m].
-  // Returns whether the walls have changed or were read for a smaller reach before.
-  bool read(const b2World& engine, const std::unordered_set<Id>& own, double reach);
+  // Reads all bodies except `own`. Returns whether the walls have changed.
+  bool read(const b2World& engine, const std::unordered_set<Id>& own);
+  // Allows queries of the walls up to a range.
+  void extend(double reach);
 
   const Walls& walls() const { return *walls_; }
   std::shared_ptr<const Walls> shared_walls() const { return walls_; }

@@ -1,6 +1,7 @@
 #include "crowd/walls.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -15,8 +16,9 @@ constexpr double kCell = 0.5;  // m
 bool crosses(const Segment& segment, Vec from, Vec to) {
   const Vec along = to - from;
   const Vec side = segment.b - segment.a;
-  return cross(along, segment.a - from) * cross(along, segment.b - from) <= 0.0 &&
-         cross(side, from - segment.a) * cross(side, to - segment.a) <= 0.0;
+  const double ends = cross(along, segment.a - from) * cross(along, segment.b - from);
+  const double others = cross(side, from - segment.a) * cross(side, to - segment.a);
+  return std::max(ends, others) <= 0.0;
 }
 
 }  // namespace
@@ -28,6 +30,7 @@ Walls::Walls(std::vector<Segment> segments, double reach)
       crossed_(segments_, kCell, 0.0) {}
 
 void Walls::find_near(Vec p, double range, std::vector<NearPoint>& found) const {
+  assert(range <= reach());
   const double most = range * range * (1.0 + 1e-9);  // including a rounding error
   const SegmentGrid::Indices near = near_.near(p);
   const std::size_t before = found.size();
@@ -50,6 +53,7 @@ void Walls::find_near(Vec p, double range, std::vector<NearPoint>& found) const 
 }
 
 double Walls::distance(Vec p, double range) const {
+  assert(range <= reach());
   double nearest = range * range;
   for (const std::uint32_t i : near_.near(p)) {
     nearest = std::min(nearest, square(nearest_on(segments_[i], p) - p));
@@ -57,7 +61,8 @@ double Walls::distance(Vec p, double range) const {
   return std::sqrt(nearest);
 }
 
-bool Walls::is_clear(Vec from, Vec to) const {
+template <typename Test>
+bool Walls::any_along(Vec from, Vec to, Test&& test) const {
   constexpr double kRounding = 1e-6;  // m
   const auto [low, high] = from.y < to.y ? std::pair(from, to) : std::pair(to, from);
   const double slope = (high.x - low.x) / std::max(high.y - low.y, kRounding);
@@ -74,11 +79,26 @@ bool Walls::is_clear(Vec from, Vec to) const {
     }
     const std::int64_t first_column = crossed_.column_of(std::min(begin, end) - kRounding);
     const std::int64_t last_column = crossed_.column_of(std::max(begin, end) + kRounding);
+    bool is_found = false;
     for (const std::uint32_t i : crossed_.in_row(row, first_column, last_column)) {
-      if (crosses(segments_[i], from, to)) return false;
+      is_found |= test(segments_[i]);
     }
+    if (is_found) return true;
   }
-  return true;
+  return false;
+}
+
+bool Walls::is_clear(Vec from, Vec to) const {
+  return !any_along(from, to, [&](const Segment& segment) { return crosses(segment, from, to); });
+}
+
+bool Walls::is_hidden(Vec p, Vec low, Vec high) const {
+  // The shadow of a segment is convex, so that it contains the rectangle if it contains the
+  // corners.
+  return any_along(0.5 * (low + high), p, [&](const Segment& segment) {
+    return crosses(segment, low, p) && crosses(segment, high, p) &&
+           crosses(segment, {low.x, high.y}, p) && crosses(segment, {high.x, low.y}, p);
+  });
 }
 
 void keep_sides(Vec p, std::vector<NearPoint>& points) {

@@ -19,6 +19,7 @@ class Walls {
   // `reach` is the greatest range of queries [m].
   Walls(std::vector<Segment> segments, double reach);
 
+  const std::vector<Segment>& segments() const { return segments_; }
   bool empty() const { return segments_.empty(); }
   Vec low() const { return near_.low(); }
   Vec high() const { return near_.high(); }
@@ -30,8 +31,15 @@ class Walls {
   double distance(Vec p, double range) const;
   // Returns whether no segment crosses the straight line between two points.
   bool is_clear(Vec from, Vec to) const;
+  // Returns whether one segment alone hides a point from all points of a rectangle.
+  bool is_hidden(Vec p, Vec low, Vec high) const;
 
  private:
+  // Returns whether test(segment) is true for any segment in the cells along a line, to which all
+  // segments that cross the line belong.
+  template <typename Test>
+  bool any_along(Vec from, Vec to, Test&& test) const;
+
   std::vector<Segment> segments_;
   SegmentGrid near_;     // within `reach` of each cell
   SegmentGrid crossed_;  // that cross each cell

@@ -1,19 +1,26 @@
 #include "crowd/ways.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <iterator>
 #include <utility>
 
 namespace flatland::crowd {
 namespace {
 
-SegmentGrid grid_of(const std::vector<Gate>& gates) {
+SegmentGrid grid_of(const std::vector<Gate>& gates, const Walls& walls) {
   constexpr double kCell = 1.0;  // m
   std::vector<Segment> centers;
   std::transform(gates.begin(), gates.end(), std::back_inserter(centers), [](const Gate& gate) {
     return Segment{gate.center, gate.center};
   });
-  return {centers, kCell, kGateReach};
+  const auto is_listed = [&](std::uint32_t i, Vec low, Vec high) {
+    const Gate& gate = gates[i];
+    const Vec center = 0.5 * (low + high);
+    const double reach = length({gate.half_length(), gate.half_width}) + length(high - center);
+    return length(gate.center - center) <= reach || !walls.is_hidden(gate.center, low, high);
+  };
+  return {centers, kCell, kGateReach, is_listed};
 }
 
 }  // namespace
@@ -37,7 +44,7 @@ Ways::Ways(FreeGrid grid, std::shared_ptr<const Walls> walls)
     : grid_(std::move(grid)),
       walls_(std::move(walls)),
       gates_(find_gates(grid_, *walls_)),
-      gate_grid_(grid_of(gates_)) {}
+      gate_grid_(grid_of(gates_, *walls_)) {}
 
 std::shared_ptr<const Way> Ways::to(const Place& place) {
   Entry* entry = nullptr;

@@ -45,8 +45,8 @@ class Ways {
 
   const FreeGrid& grid() const { return grid_; }
   const std::vector<Gate>& gates() const { return gates_; }
-  // Returns the indices of all gates within a distance of `kGateReach` of a point, in ascending
-  // order, and of few others.
+  // Returns the indices of all gates within a distance of `kGateReach` of a point that are visible
+  // or contain the point, in ascending order, and of few others.
   SegmentGrid::Indices gates_near(Vec p) const { return gate_grid_.near(p); }
   std::shared_ptr<const Way> to(const Place& place);
   // Returns a way that is not kept.
