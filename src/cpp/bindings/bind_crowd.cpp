@@ -92,6 +92,7 @@ void set_numbers(Settings& settings, const std::map<std::string, double>& number
        {"relaxation_time", "range", "wall_range", "horizon", "wall_horizon", "cell"}) {
     if (*places.at(name) <= 0.0) throw py::value_error(std::string(name) + " must be positive");
   }
+  forces.derive();
 }
 
 crowd::Person to_person(World& world, const py::handle& member) {

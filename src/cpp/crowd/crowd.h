@@ -20,6 +20,7 @@
 #include <cstdint>
 #include <memory>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include "crowd/gates.h"
@@ -38,10 +39,7 @@ namespace crowd {
 class Crowd {
  public:
   Crowd() : Crowd(Settings{}) {}
-  explicit Crowd(const Settings& settings)
-      : settings_(settings),
-        force_sight_(crowd::wall_sight(settings.forces)),
-        surroundings_(settings.bits) {
+  explicit Crowd(const Settings& settings) : settings_(settings), surroundings_(settings.bits) {
     surroundings_.extend(std::max(FreeGrid::range(settings.clearance), settings.leg_radius));
   }
 
@@ -135,9 +133,9 @@ class Crowd {
   };
 
   void keep_doors_clear(std::vector<Choice>& choices, std::int64_t step, double dt);
-  void find_approaches(std::size_t i, const Choice& choice, std::vector<Approach>& found);
+  void find_approaches(std::size_t i, const Choice& choice);
   Signal signal_of(std::uint32_t gate) const;
-  void update_signals(std::vector<Approach> approaching, std::int64_t step, double dt);
+  void update_signals(std::int64_t step, double dt);
   Choice step_aside(const Person& person, const Choice& choice, const Approach& approach) const;
   bool comes_towards(const Person& person, Vec way, std::size_t j, const Choice& choice,
                      double& ahead) const;
@@ -168,7 +166,6 @@ class Crowd {
   void update(World& world, std::int64_t step, double dt);
 
   Settings settings_;
-  double force_sight_;  // gap below which walls repel people in the social force model [m]
   std::vector<Waypoint> waypoints_;
   std::vector<Route> routes_;
   std::vector<Party> parties_;
@@ -184,9 +181,13 @@ class Crowd {
   std::vector<std::shared_ptr<const Way>> way_to_;  // by waypoint, null if not needed yet
   std::vector<Signal> signals_;                     // of the gates with people, by gate
 
+  std::vector<std::uint32_t> sorted_;  // indices of people by x, in the last update
+
   // The members below are valid within one update.
   std::vector<std::uint32_t> guests_;  // number of people who stand at each waypoint
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;  // people who see each other
   std::vector<std::uint32_t> neighbours_, neighbour_starts_;
+  std::vector<Approach> approaching_;
   std::vector<Vec> chosen_;
   std::size_t decided_ = 0;            // number of people whose velocity is chosen
   std::vector<NearPoint> near_walls_;  // within reach of each person

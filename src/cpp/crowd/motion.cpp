@@ -40,32 +40,34 @@ double closing_offset(double gap, double period) {
 
 void Crowd::find_neighbours() {
   const auto count = static_cast<std::uint32_t>(people_.size());
-  std::vector<std::uint32_t> sorted(count);
-  std::iota(sorted.begin(), sorted.end(), 0U);
-  std::sort(sorted.begin(), sorted.end(), [&](std::uint32_t a, std::uint32_t b) {
+  if (sorted_.size() != count) {
+    sorted_.resize(count);
+    std::iota(sorted_.begin(), sorted_.end(), 0U);
+  }
+  std::sort(sorted_.begin(), sorted_.end(), [&](std::uint32_t a, std::uint32_t b) {
     const double xa = people_[a].position.x;
     const double xb = people_[b].position.x;
     return xa != xb ? xa < xb : a < b;
   });
   const double sight2 = settings_.sight * settings_.sight;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+  pairs_.clear();
   for (std::uint32_t s = 0; s < count; ++s) {
-    const Vec p = people_[sorted[s]].position;
+    const Vec p = people_[sorted_[s]].position;
     for (std::uint32_t t = s + 1; t < count; ++t) {
-      const Vec offset = people_[sorted[t]].position - p;
+      const Vec offset = people_[sorted_[t]].position - p;
       if (offset.x > settings_.sight) break;
-      if (square(offset) < sight2) pairs.emplace_back(sorted[s], sorted[t]);
+      if (square(offset) < sight2) pairs_.emplace_back(sorted_[s], sorted_[t]);
     }
   }
   neighbour_starts_.assign(count + 1, 0);
-  for (const auto& [a, b] : pairs) {
+  for (const auto& [a, b] : pairs_) {
     ++neighbour_starts_[a + 1];
     ++neighbour_starts_[b + 1];
   }
   std::partial_sum(neighbour_starts_.begin(), neighbour_starts_.end(), neighbour_starts_.begin());
-  neighbours_.resize(2 * pairs.size());
+  neighbours_.resize(2 * pairs_.size());
   std::vector<std::uint32_t> next(neighbour_starts_.begin(), neighbour_starts_.end() - 1);
-  for (const auto& [a, b] : pairs) {
+  for (const auto& [a, b] : pairs_) {
     neighbours_[next[a]++] = b;
     neighbours_[next[b]++] = a;
   }
@@ -73,7 +75,7 @@ void Crowd::find_neighbours() {
 
 double Crowd::wall_sight(const Person& person) const {
   return settings_.model == Settings::Model::kOrca ? settings_.wall_horizon * most_speed(person)
-                                                   : force_sight_;
+                                                   : settings_.forces.wall_sight;
 }
 
 double Crowd::wall_range(const Person& person, double period) const {

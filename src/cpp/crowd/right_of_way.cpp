@@ -27,15 +27,15 @@ constexpr double kMostTurn = 0.5;  // tangent of the greatest angle by which peo
 }  // namespace
 
 // Appends the doors that person i approaches or passes.
-void Crowd::find_approaches(std::size_t i, const Choice& choice, std::vector<Approach>& found) {
+void Crowd::find_approaches(std::size_t i, const Choice& choice) {
   const Person& person = people_[i];
   const std::vector<Gate>& gates = ways_->gates();
   const SegmentGrid::Indices near = ways_->gates_near(person.position);
-  const std::size_t before = found.size();
-  found.resize(before + near.size());
+  const std::size_t before = approaching_.size();
+  approaching_.resize(before + near.size());
   // As in Walls::find_near, without branches: a door that is not approached is replaced by the next
   // one.
-  Approach* end = found.data() + before;
+  Approach* end = approaching_.data() + before;
   for (const std::uint32_t k : near) {
     const Gate& gate = gates[k];
     const Vec offset = person.position - gate.center;
@@ -49,7 +49,7 @@ void Crowd::find_approaches(std::size_t i, const Choice& choice, std::vector<App
     end += static_cast<std::ptrdiff_t>(is_near & (is_ahead | is_inside));
   }
   const Way& way = *way_of(target_of(person));
-  Approach* kept = found.data() + before;
+  Approach* kept = approaching_.data() + before;
   for (const Approach* each = kept; each != end; ++each) {
     const Gate& gate = gates[each->gate];
     // The way is taken at the center: next to a door post, the way may lead in any direction.
@@ -61,7 +61,7 @@ void Crowd::find_approaches(std::size_t i, const Choice& choice, std::vector<App
       *kept++ = {i, each->gate, cosine > 0.0 ? 1 : 0, each->is_inside, std::sqrt(each->distance)};
     }
   }
-  found.resize(static_cast<std::size_t>(kept - found.data()));
+  approaching_.resize(static_cast<std::size_t>(kept - approaching_.data()));
 }
 
 Crowd::Choice Crowd::step_aside(const Person& person, const Choice& choice,
@@ -87,14 +87,15 @@ Signal Crowd::signal_of(std::uint32_t gate) const {
   return found != signals_.end() && found->gate == gate ? *found : Signal{gate};
 }
 
-void Crowd::update_signals(std::vector<Approach> approaching, std::int64_t step, double dt) {
-  std::sort(approaching.begin(), approaching.end(),
+void Crowd::update_signals(std::int64_t step, double dt) {
+  std::sort(approaching_.begin(), approaching_.end(),
             [](const Approach& a, const Approach& b) { return a.gate < b.gate; });
   std::vector<Signal> signals;
-  for (auto each = approaching.begin(); each != approaching.end();) {
+  signals.reserve(approaching_.size());
+  for (auto each = approaching_.begin(); each != approaching_.end();) {
     Signal signal = signal_of(each->gate);
     Demand demand;
-    for (; each != approaching.end() && each->gate == signal.gate; ++each) {
+    for (; each != approaching_.end() && each->gate == signal.gate; ++each) {
       const int direction = each->direction;
       if (each->is_inside) {
         ++demand.inside[direction];
@@ -111,13 +112,13 @@ void Crowd::update_signals(std::vector<Approach> approaching, std::int64_t step,
 
 void Crowd::keep_doors_clear(std::vector<Choice>& choices, std::int64_t step, double dt) {
   if (ways_ == nullptr || ways_->gates().empty()) return;
-  std::vector<Approach> approaching;
+  approaching_.clear();
   for (std::size_t i = 0; i < people_.size(); ++i) {
     if (stance_of(people_[i], choices[i]) != Stance::kWalking) continue;
-    find_approaches(i, choices[i], approaching);
+    find_approaches(i, choices[i]);
   }
-  update_signals(approaching, step, dt);
-  for (const Approach& approach : approaching) {
+  update_signals(step, dt);
+  for (const Approach& approach : approaching_) {
     const Signal signal = signal_of(approach.gate);
     const bool is_open =
         signal.direction == approach.direction && (approach.is_inside || !signal.is_closing);

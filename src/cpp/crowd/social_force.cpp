@@ -11,8 +11,22 @@ constexpr double kRightAngle = 1.5707963267948966;
 // and the least distance of two members of a group [m].
 constexpr double kGroupView = kRightAngle;
 constexpr double kGroupDistance = 0.8;
+// The greatest length of the gradient of b in a repulsion; it has no bound next to the foci.
+constexpr double kMostSlope = 3.0;
+
+// Returns the distance over which an acceleration decreases to a negligible one, if it decreases by
+// the factor e over a range [m].
+double sight(double acceleration, double range) {
+  return range * std::log(std::max(acceleration / kNegligible, 1.0));
+}
 
 }  // namespace
+
+void SocialForces::derive() {
+  person_sight = sight(kMostSlope * strength / range, range);
+  wall_sight = sight(wall_strength, wall_range);
+  view_cosine = std::cos(half_view);
+}
 
 Vec driving_acceleration(const SocialForces& forces, Vec preferred, Vec velocity) {
   return (1.0 / forces.relaxation_time) * (preferred - velocity);
@@ -28,25 +42,20 @@ Vec repulsion(const SocialForces& forces, Vec offset, Vec other_velocity) {
   const double sum = here + there;
   constexpr double kLeast = 1e-3;  // least b [m]; on the line between the foci, b would be 0
   const double b = std::max(0.5 * std::sqrt(std::max(sum * sum - square(step), 0.0)), kLeast);
+  if (b > forces.person_sight) return {};
   const double size = forces.strength / forces.range * std::exp(-b / forces.range);
   const Vec slope = sum / (4.0 * b) * (unit(offset, {1.0, 0.0}) + unit(later));
-  // The gradient of b is limited, because its length has no bound next to the foci.
-  constexpr double kMostSlope = 3.0;
   return size * limited(slope, kMostSlope);
 }
 
 double view_weight(const SocialForces& forces, Vec heading, Vec push) {
   const double along = -dot(heading, push);
-  return along >= length(push) * std::cos(forces.half_view) ? 1.0 : forces.behind;
+  return along >= length(push) * forces.view_cosine ? 1.0 : forces.behind;
 }
 
 Vec wall_repulsion(const SocialForces& forces, Vec offset, double radius) {
   const double gap = length(offset) - radius;
   return forces.wall_strength * std::exp(-std::max(gap, 0.0) / forces.wall_range) * unit(offset);
-}
-
-double wall_sight(const SocialForces& forces) {
-  return forces.wall_range * std::log(std::max(forces.wall_strength / kNegligible, 1.0));
 }
 
 Vec group_attraction(const SocialForces& forces, int size, Vec heading, Vec velocity,

@@ -9,7 +9,11 @@
 
 namespace flatland::crowd {
 
+inline constexpr double kNegligible = 0.01;  // acceleration that is ignored [m/s²]
+
 struct SocialForces {
+  SocialForces() { derive(); }
+
   double relaxation_time = 0.5;  // tau [s]
   double strength = 2.1;         // V0 [m²/s²]
   double range = 0.3;            // sigma [m]
@@ -22,16 +26,22 @@ struct SocialForces {
   double gaze = 4.0;             // beta 1 of groups [1/s]
   double cohesion = 3.0;         // beta 2 of groups [m/s²]
   double spacing = 1.0;          // beta 3 of groups [m/s²]
-};
 
-inline constexpr double kNegligible = 0.01;  // acceleration that is ignored [m/s²]
+  // Computes the members below from those above; to be called after changes.
+  void derive();
+
+  double person_sight;  // semi-minor axis of the ellipse beyond which people do not repel [m]
+  double wall_sight;    // gap beyond which walls do not repel [m]
+  double view_cosine;   // cosine of half of the field of view
+};
 
 // Returns the acceleration towards a preferred velocity, (v0 e - v) / tau.
 Vec driving_acceleration(const SocialForces& forces, Vec preferred, Vec velocity);
 
 // Returns the repulsion by another person, without the weight of the field of view. `offset` leads
 // from the other person to this person. The equipotential lines are ellipses along
-// `other_velocity`, because a walking person needs room for the next steps.
+// `other_velocity`, because a walking person needs room for the next steps. Negligible repulsions
+// are zero.
 Vec repulsion(const SocialForces& forces, Vec offset, Vec other_velocity);
 
 // Returns the weight of an influence from the direction -`push` on a person who walks along
@@ -43,9 +53,6 @@ double view_weight(const SocialForces& forces, Vec heading, Vec push);
 // the person. Measured from the center, the posts of a door of one metre would repel too strongly
 // to let anybody pass.
 Vec wall_repulsion(const SocialForces& forces, Vec offset, double radius);
-
-// Returns the gap beyond which this repulsion is negligible.
-double wall_sight(const SocialForces& forces);
 
 // Returns the accelerations in a group of `size` people that turn the gaze and hold the group
 // together. The first one slows a person down until all other members are in the field of view; the
