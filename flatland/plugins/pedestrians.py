@@ -84,7 +84,7 @@ class Pedestrians(WorldPlugin):
                 raise group.reader.error(f'group "{group.name}": {error.message}') from error
 
     def _draw_key(self) -> int:
-        return int(self.rng.integers(0, 1 << 64, dtype=np.uint64))
+        return int(self.rng.bit_generator.random_raw())
 
     def _open_ports(self, config: YamlReader) -> None:
         topic = config.get("topic", "string", "people")

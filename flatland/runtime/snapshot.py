@@ -208,10 +208,11 @@ class Snapshots:
         """Restores a snapshot; see `World.restore`."""
         if snapshot._owner is not self:
             raise WorldError("the snapshot is one of another world")
-        for plugin in self._revived_plugins(snapshot):
+        revived = self._revived_plugins(snapshot)
+        for plugin in revived:
             if plugin.ros is not None and plugin.ros.used and not _defines_state(plugin):
                 raise _ended(plugin, "ros")
-        self._restore(snapshot)
+        self._restore(snapshot, revived)
 
     def _revived_plugins(self, snapshot: WorldSnapshot) -> list[FlatlandPlugin]:
         """Returns the plugins that have ended, and that a restore of a snapshot brings back."""
@@ -225,12 +226,11 @@ class Snapshots:
             for command in commands:
                 command.settle()
 
-    def _restore(self, snapshot: WorldSnapshot) -> None:
+    def _restore(self, snapshot: WorldSnapshot, revived_plugins: list[FlatlandPlugin]) -> None:
         self._settle()
         models, observers = list(self._models.by_name.values()), self._observers
         kept = set(models) & set(snapshot._models)
         revived = [model for model in snapshot._models if model not in kept]
-        revived_plugins = self._revived_plugins(snapshot)
         for plugin in revived_plugins:
             self._check_revivable(plugin)
         newer = [p for p in self._host.world_plugins if p not in snapshot._world_plugins]
@@ -293,7 +293,7 @@ class Snapshots:
         """
         try:
             if before is not None:
-                self._restore(before)
+                self._restore(before, self._revived_plugins(before))
                 return
         except WorldError as error:
             _LOG.error("%s", error)

@@ -188,8 +188,8 @@ class Crowd {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;  // people who see each other
   std::vector<std::uint32_t> neighbours_, neighbour_starts_;
   std::vector<Approach> approaching_;
-  std::vector<Vec> chosen_;
-  std::size_t decided_ = 0;            // number of people whose velocity is chosen
+  std::vector<Vec> chosen_;            // wanted velocities, and then those of the motion
+  std::size_t decided_ = 0;            // number of people whose velocity of the motion is chosen
   std::vector<NearPoint> near_walls_;  // within reach of each person
   std::vector<std::uint32_t> near_wall_starts_;
   std::vector<NearPoint> near_;

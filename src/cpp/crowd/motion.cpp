@@ -240,13 +240,13 @@ void Crowd::update(World& world, std::int64_t step, double dt) {
   find_walls(period);
   count_guests();
   std::vector<Choice> choices(people_.size());
-  std::vector<Vec> wanted(people_.size());
   for (std::size_t i = 0; i < people_.size(); ++i) {
     choices[i] = choose(people_[i], step, dt, period);
   }
   keep_doors_clear(choices, step, dt);
   keep_right(choices);
   give_way(choices, step, dt, period);
+  chosen_.resize(people_.size());
   for (std::size_t i = 0; i < people_.size(); ++i) {
     const Person& person = people_[i];
     const Choice& choice = choices[i];
@@ -255,14 +255,13 @@ void Crowd::update(World& world, std::int64_t step, double dt) {
       preferred += settings_.fluctuation * normal(settings_.key, kFluctuations + person.number,
                                                   2 * static_cast<std::uint64_t>(step));
     }
-    wanted[i] = settings_.model == Settings::Model::kSocialForce
-                    ? by_social_force(i, choice, preferred, period)
-                    : by_orca(i, preferred, period);
+    chosen_[i] = settings_.model == Settings::Model::kSocialForce
+                     ? by_social_force(i, choice, preferred, period)
+                     : by_orca(i, preferred, period);
   }
-  chosen_.assign(people_.size(), {});
   for (decided_ = 0; decided_ < people_.size(); ++decided_) {
     const std::size_t i = decided_;
-    chosen_[i] = settings_.is_dynamic ? wanted[i] : without_contact(i, wanted[i], period);
+    if (!settings_.is_dynamic) chosen_[i] = without_contact(i, chosen_[i], period);
     move_body(world, i, choices[i], chosen_[i], period);
   }
 }

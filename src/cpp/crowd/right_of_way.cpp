@@ -141,11 +141,9 @@ bool Crowd::comes_towards(const Person& person, Vec way, std::size_t j, const Ch
 }
 
 void Crowd::keep_right(std::vector<Choice>& choices) const {
-  std::vector<Vec> turned(people_.size());
   for (std::size_t i = 0; i < people_.size(); ++i) {
     const Vec way = choices[i].direction;
-    turned[i] = choices[i].velocity;
-    if (square(turned[i]) == 0.0 || choices[i].is_held) continue;
+    if (square(choices[i].velocity) == 0.0 || choices[i].is_held) continue;
     double nearest = kView;
     for (std::uint32_t k = neighbour_starts_[i]; k < neighbour_starts_[i + 1]; ++k) {
       const std::size_t j = neighbours_[k];
@@ -154,9 +152,10 @@ void Crowd::keep_right(std::vector<Choice>& choices) const {
     }
     if (nearest == kView) continue;
     const double turn = kMostTurn * std::sqrt(1.0 - nearest / kView);
-    turned[i] = people_[i].speed * unit(way - turn * left_of(way));
+    // Others turn by the direction of the way, and because of whether a velocity is zero: both
+    // remain.
+    choices[i].velocity = people_[i].speed * unit(way - turn * left_of(way));
   }
-  for (std::size_t i = 0; i < people_.size(); ++i) choices[i].velocity = turned[i];
 }
 
 }  // namespace flatland::crowd
