@@ -1637,6 +1637,23 @@ def nearest_point(
     radius: float,
     hard: int = 0,
 ) -> tuple[float, float]: ...
+def crowd_near_walls(
+    segments: Sequence[tuple[Sequence[float], Sequence[float]]],
+    reach: float,
+    place: Sequence[float],
+    range: float,
+) -> tuple[list[float], float]: ...
+def crowd_is_clear(
+    segments: Sequence[tuple[Sequence[float], Sequence[float]]],
+    a: Sequence[float],
+    b: Sequence[float],
+) -> bool: ...
+def crowd_is_hidden(
+    segments: Sequence[tuple[Sequence[float], Sequence[float]]],
+    place: Sequence[float],
+    low: Sequence[float],
+    high: Sequence[float],
+) -> bool: ...
 def step_length(speed: float) -> float: ...
 def leg_offset(phase: float, speed: float) -> float: ...
 

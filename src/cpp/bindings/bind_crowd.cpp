@@ -16,6 +16,7 @@
 #include "crowd/gait.h"
 #include "crowd/orca.h"
 #include "crowd/social_force.h"
+#include "crowd/walls.h"
 #include "world/bodies.h"
 #include "world/errors.h"
 
@@ -388,6 +389,36 @@ void bind_formulas(py::module_& module) {
       },
       py::arg("planes"), py::arg("preferred"), py::kw_only(), py::arg("radius"),
       py::arg("hard") = 0);
+  using PySegments = std::vector<std::pair<PyPoint, PyPoint>>;
+  const auto to_walls = [](const PySegments& pairs, double reach) {
+    std::vector<crowd::Segment> segments;
+    for (const auto& [a, b] : pairs) segments.push_back({to_vec(a), to_vec(b)});
+    return crowd::Walls(segments, reach);
+  };
+  module.def(
+      "crowd_near_walls",
+      [to_walls](const PySegments& segments, double reach, const PyPoint& place, double range) {
+        const crowd::Walls walls = to_walls(segments, reach);
+        std::vector<crowd::NearPoint> found;
+        walls.find_near(to_vec(place), range, found);
+        std::vector<double> distances;
+        for (const crowd::NearPoint& each : found) distances.push_back(each.distance);
+        return std::pair{distances, walls.distance(to_vec(place), range)};
+      },
+      py::arg("segments"), py::arg("reach"), py::arg("place"), py::arg("range"));
+  module.def(
+      "crowd_is_clear",
+      [to_walls](const PySegments& segments, const PyPoint& a, const PyPoint& b) {
+        return to_walls(segments, 0.0).is_clear(to_vec(a), to_vec(b));
+      },
+      py::arg("segments"), py::arg("a"), py::arg("b"));
+  module.def(
+      "crowd_is_hidden",
+      [to_walls](const PySegments& segments, const PyPoint& place, const PyPoint& low,
+                 const PyPoint& high) {
+        return to_walls(segments, 0.0).is_hidden(to_vec(place), to_vec(low), to_vec(high));
+      },
+      py::arg("segments"), py::arg("place"), py::arg("low"), py::arg("high"));
   module.def("step_length", &crowd::step_length, py::arg("speed"));
   module.def("leg_offset", &crowd::leg_offset, py::arg("phase"), py::arg("speed"));
 }

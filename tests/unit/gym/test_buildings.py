@@ -25,6 +25,8 @@ from flatland.gym import (
     make_vec,
     stage,
 )
+from flatland.plugins.pedestrians import Pedestrians
+from flatland.values import PeopleStates
 
 Make = Callable[..., Any]
 
@@ -103,6 +105,28 @@ def test_people_begin_each_episode_at_other_places(make: Make) -> None:
             envs.step(np.array([[-1.0, 0.0]] * 2))
         ends.update(people())
     assert len(starts) == len(ends) == 4  # The last episodes repeat the first ones.
+
+
+def test_people_that_nothing_wants_are_not_read(
+    make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[float] = []
+    original = Pedestrians._read_people
+
+    def read_people(plugin: Pedestrians, stamp: int) -> PeopleStates:
+        read.append(plugin.world.time)
+        return original(plugin, stamp)
+
+    monkeypatch.setattr(Pedestrians, "_read_people", read_people)
+    envs = make(make_vec, "flatland/Crowd-v0", 2, autoreset_mode="SameStep")
+    envs.reset(seed=0)
+    envs.step(np.zeros((2, 2)))
+    assert read == []
+    people: list[PeopleStates] = []
+    envs.worlds[0].output("/people/states").subscribe(people.append)
+    envs.step(np.zeros((2, 2)))
+    assert len(people) == len(read) == 1
+    assert people[0].poses[0] == pytest.approx(envs.worlds[0].model("person_0").pose, abs=0.2)
 
 
 def test_episodes_among_people_equal_those_of_single_environments(

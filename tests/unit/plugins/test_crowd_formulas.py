@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from flatland._core import (
     crowd_avoid,
+    crowd_is_clear,
+    crowd_is_hidden,
+    crowd_near_walls,
     crowd_repulsion,
     crowd_wall_repulsion,
     leg_offset,
@@ -44,6 +48,83 @@ def test_the_repulsion_is_the_gradient_of_the_elliptic_potential() -> None:
 def test_a_wall_repels_exponentially_with_the_distance_from_the_circumference() -> None:
     x, y = crowd_wall_repulsion((0.0, -0.5), 0.2, {"wall_strength": 5.0, "wall_range": 0.1})
     assert (x, y) == pytest.approx((0.0, -5.0 * math.exp(-3.0)))
+
+
+def test_negligible_repulsions_are_zero() -> None:
+    # The limit is 0.01 m/s²; the gradient is at most three times that of a round potential.
+    for distance in np.arange(0.1, 6.0, 0.01).tolist():
+        exact = 7.0 * math.exp(-distance / 0.3)
+        x, _ = crowd_repulsion((distance, 0.0), (0.0, 0.0), {"strength": 2.1, "range": 0.3})
+        assert x == pytest.approx(exact) or (x == 0.0 and exact < 0.01)
+    assert x == 0.0
+
+
+Segments = list[tuple[tuple[float, float], tuple[float, float]]]
+
+
+def random_segments(rng: np.random.Generator) -> Segments:
+    """Segments with lengths from 0 to 4 m in an area of random size, some of them equal."""
+    count, area = int(rng.integers(0, 30)), rng.uniform(0.0, 8.0, 2)
+    first = rng.uniform(0.0, 1.0, (count, 2)) * area
+    second = first + rng.uniform(-2.0, 2.0, (count, 2)) * rng.integers(0, 2, (count, 2))
+    pairs = np.stack([first, second], 1)
+    return [((a, b), (c, d)) for (a, b), (c, d) in np.repeat(pairs, 2, 0)[count // 2 :].tolist()]
+
+
+def distance_from(segment: tuple[tuple[float, float], tuple[float, float]], place: Any) -> float:
+    a, b = np.array(segment)
+    size = float(np.sum((b - a) ** 2))
+    t = 0.0 if size == 0.0 else min(max(float(np.dot(place - a, b - a)) / size, 0.0), 1.0)
+    return float(np.hypot(*(a + t * (b - a) - place)))
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_the_walls_near_a_place_are_all_walls_within_the_range(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    segments, reach = random_segments(rng), float(rng.uniform(0.1, 4.0))
+    for _ in range(100):
+        place = rng.uniform(-3.0, 11.0, 2)
+        range_ = min(float(rng.uniform(0.0, 2.0)), 1.0) * reach
+        distances = [distance_from(segment, place) for segment in segments]
+        found, least = crowd_near_walls(segments, reach, place.tolist(), range_)
+        assert found == pytest.approx([d for d in distances if d <= range_], abs=1e-12)
+        assert least == pytest.approx(min([*distances, range_]), abs=1e-12)
+
+
+def side_of(a: Any, b: Any, place: Any) -> float:
+    return float((b[0] - a[0]) * (place[1] - a[1]) - (b[1] - a[1]) * (place[0] - a[0]))
+
+
+def cross_each_other(a: Any, b: Any, c: Any, d: Any) -> bool:
+    return side_of(a, b, c) * side_of(a, b, d) <= 0.0 and side_of(c, d, a) * side_of(c, d, b) <= 0.0
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_a_line_is_clear_if_no_wall_crosses_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    segments = random_segments(rng)
+    for _ in range(20):
+        a, b = rng.uniform(-2.0, 10.0, (2, 2)).tolist()
+        is_crossed = any(cross_each_other(a, b, *segment) for segment in segments)
+        assert crowd_is_clear(segments, a, b) == (not is_crossed)
+
+
+def test_a_place_is_hidden_only_from_rectangles_without_a_clear_line_to_it() -> None:
+    hidden = 0
+    for seed in range(400):
+        rng = np.random.default_rng(seed)
+        segments = random_segments(rng)
+        place, low = rng.uniform(0.0, 8.0, (2, 2))
+        high = low + rng.uniform(0.0, 1.0, 2)
+        if not crowd_is_hidden(segments, place.tolist(), low.tolist(), high.tolist()):
+            continue
+        hidden += 1
+        for point in (low + rng.uniform(0.0, 1.0, (50, 2)) * (high - low)).tolist():
+            assert not crowd_is_clear(segments, point, place.tolist())
+    assert hidden > 30
+    wall: Segments = [((1.0, -3.0), (1.0, 3.0))]
+    assert crowd_is_hidden(wall, (0.0, 0.0), (2.0, -1.0), (3.0, 1.0))
+    assert not crowd_is_hidden(wall, (0.0, 0.0), (2.0, -1.0), (3.0, 9.5))  # not from a corner
 
 
 def test_two_discs_share_the_change_of_velocity_that_avoids_a_head_on_collision() -> None:

@@ -25,6 +25,21 @@ def test_the_speed_relaxes_exponentially(files: WorldFiles) -> None:
     assert speed == pytest.approx(1.2 * (1.0 - (1.0 - 0.005 / 0.5) ** 201), rel=1e-3)
 
 
+@pytest.mark.parametrize(("wall_range", "is_pushed"), [(0.5, True), (0.1, False)])
+def test_walls_repel_at_the_distance_that_follows_from_the_range(
+    files: WorldFiles, wall_range: float, is_pushed: bool
+) -> None:
+    # At a gap of 1.3 m, the repulsion is 0.37 m/s² with a range of 0.5 m, negligible with 0.1 m.
+    hall = ["#" * 22, *["#" + " " * 20 + "#"] * 20, "#" * 22]
+    world = load(
+        files, ONE % "[18, 2.5]", CALM + f"social_force: {{wall_range: {wall_range}}}, ", hall
+    )
+    people = people_of(world)
+    people.spawn(poses=[(6.0, 2.5, 0.0)])
+    world.step(200)
+    assert (people.people.poses[0, 1] > 2.52) == is_pushed
+
+
 def two_people(files: WorldFiles, left_y: float, right_y: float, options: str = "") -> World:
     """A world with two people who walk towards each other."""
     groups = (
