@@ -2,7 +2,9 @@
 #include <pybind11/stl.h>
 
 #include <cmath>
+#include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <tuple>
@@ -17,6 +19,7 @@
 #include "crowd/orca.h"
 #include "crowd/social_force.h"
 #include "crowd/walls.h"
+#include "crowd/ways.h"
 #include "world/bodies.h"
 #include "world/errors.h"
 
@@ -419,6 +422,26 @@ void bind_formulas(py::module_& module) {
         return to_walls(segments, 0.0).is_hidden(to_vec(place), to_vec(low), to_vec(high));
       },
       py::arg("segments"), py::arg("place"), py::arg("low"), py::arg("high"));
+  module.def(
+      "crowd_doors",
+      [to_walls](const PySegments& segments, const std::vector<PyPoint>& places) {
+        constexpr double kClearance = 0.22;
+        const auto walls = std::make_shared<const crowd::Walls>(
+            to_walls(segments, crowd::FreeGrid::range(kClearance)));
+        const Vec margin{1.0, 1.0};
+        const crowd::Ways ways(
+            crowd::FreeGrid(*walls, walls->low() - margin, walls->high() + margin, 0.1, kClearance),
+            walls);
+        std::vector<PyPair> centers;
+        for (const crowd::Gate& gate : ways.gates()) centers.push_back(to_pair(gate.center));
+        std::vector<std::vector<std::uint32_t>> near;
+        for (const PyPoint& place : places) {
+          const crowd::SegmentGrid::Indices indices = ways.gates_near(to_vec(place));
+          near.emplace_back(indices.begin(), indices.end());
+        }
+        return std::pair{centers, near};
+      },
+      py::arg("segments"), py::arg("places"));
   module.def("step_length", &crowd::step_length, py::arg("speed"));
   module.def("leg_offset", &crowd::leg_offset, py::arg("phase"), py::arg("speed"));
 }

@@ -23,6 +23,8 @@ SegmentGrid::SegmentGrid(const std::vector<Segment>& segments, double cell, doub
       high_ = {std::max(high_.x, p.x), std::max(high_.y, p.y)};
     }
   }
+  low_ -= {reach, reach};
+  high_ += {reach, reach};
   const Vec size = high_ - low_;
   cell_ = cell_size(size, cell);
   per_metre_ = 1.0 / cell_;

@@ -51,13 +51,13 @@ class SegmentGrid {
   SegmentGrid(const std::vector<Segment>& segments, double cell, double reach,
               const IsListed& is_listed = nullptr);
 
+  // The area within the reach of the segments, in which points are in a cell.
   Vec low() const { return low_; }
   Vec high() const { return high_; }
   double cell() const { return cell_; }
   double reach() const { return reach_; }
   std::int64_t rows() const { return rows_; }
-  // A point outside of the grid is in the nearest cell of the border, which is near the same
-  // segments.
+  // The cell of the border that is nearest to a point outside of the area counts as its cell.
   std::int64_t column_of(double x) const { return index((x - low_.x) * per_metre_, columns_); }
   std::int64_t row_of(double y) const { return index((y - low_.y) * per_metre_, rows_); }
 

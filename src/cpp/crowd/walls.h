@@ -21,8 +21,8 @@ class Walls {
 
   const std::vector<Segment>& segments() const { return segments_; }
   bool empty() const { return segments_.empty(); }
-  Vec low() const { return near_.low(); }
-  Vec high() const { return near_.high(); }
+  Vec low() const { return crossed_.low(); }
+  Vec high() const { return crossed_.high(); }
   double reach() const { return near_.reach(); }
 
   // Appends the nearest points of all segments within a range.

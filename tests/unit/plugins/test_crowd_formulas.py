@@ -10,6 +10,7 @@ import pytest
 
 from flatland._core import (
     crowd_avoid,
+    crowd_doors,
     crowd_is_clear,
     crowd_is_hidden,
     crowd_near_walls,
@@ -125,6 +126,22 @@ def test_a_place_is_hidden_only_from_rectangles_without_a_clear_line_to_it() -> 
     wall: Segments = [((1.0, -3.0), (1.0, 3.0))]
     assert crowd_is_hidden(wall, (0.0, 0.0), (2.0, -1.0), (3.0, 1.0))
     assert not crowd_is_hidden(wall, (0.0, 0.0), (2.0, -1.0), (3.0, 9.5))  # not from a corner
+
+
+def test_the_doors_near_a_place_contain_all_that_are_visible() -> None:
+    visible = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        segments = random_segments(rng)
+        places = rng.uniform(-4.0, 12.0, (200, 2))
+        doors, near = crowd_doors(segments, places.tolist())
+        for place, indices in zip(places, near, strict=True):
+            assert indices == sorted(set(indices))
+            for index, door in enumerate(doors):
+                if np.hypot(*(place - door)) <= 4.0 and crowd_is_clear(segments, place, door):
+                    assert index in indices
+                    visible += 1
+    assert visible > 1000
 
 
 def test_two_discs_share_the_change_of_velocity_that_avoids_a_head_on_collision() -> None:
