@@ -11,8 +11,8 @@
 //   giving_way.cpp    who makes room for whom
 //   motion.cpp        the velocity by a model, free of contacts, and the motion of the legs
 // redraw.cpp contains the first places of people. Parts without a state: flow_field and ways (ways
-// on a grid), walls and surroundings (what is avoided), gates (doors), social_force and orca with
-// half_planes (the models), gait (legs), random.
+// on a grid), walls and surroundings (what is avoided), gates (doors), segment_grid (walls and
+// doors near a place), social_force and orca with half_planes (the models), gait (legs), random.
 #pragma once
 
 #include <algorithm>
@@ -180,8 +180,7 @@ class Crowd {
   bool has_grid_ = false;                           // whether `ways_` and `way_to_` match the walls
   std::vector<std::shared_ptr<const Way>> way_to_;  // by waypoint, null if not needed yet
   std::vector<Signal> signals_;                     // of the gates with people, by gate
-
-  std::vector<std::uint32_t> sorted_;  // indices of people by x, in the last update
+  std::vector<std::uint32_t> sorted_;               // indices of people by x at the last update
 
   // The members below are valid within one update.
   std::vector<std::uint32_t> guests_;  // number of people who stand at each waypoint

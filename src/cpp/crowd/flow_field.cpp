@@ -147,12 +147,8 @@ FlowField::FlowField(const FreeGrid& grid, const Place& place)
 }
 
 void FlowField::prefetch(Vec p) const {
-  const auto bounded = [](double coordinate, std::int64_t count) {
-    return static_cast<std::int64_t>(
-        std::min(std::max(0.0, coordinate), static_cast<double>(count - 1)));
-  };
-  const std::int64_t column = bounded((p.x - low_.x) / cell_ - 0.5, columns_);
-  const std::int64_t row = bounded((p.y - low_.y) / cell_ - 0.5, rows_);
+  const std::int64_t column = cell_index((p.x - low_.x) / cell_ - 0.5, columns_);
+  const std::int64_t row = cell_index((p.y - low_.y) / cell_ - 0.5, rows_);
   for (const std::int64_t each : {row, std::min(row + 1, rows_ - 1)}) {
     flatland::prefetch(&directions_[index(column, each)], 2 * sizeof(Direction));
   }

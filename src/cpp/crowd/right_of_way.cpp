@@ -26,15 +26,14 @@ constexpr double kMostTurn = 0.5;  // tangent of the greatest angle by which peo
 
 }  // namespace
 
-// Appends the doors that person i approaches or passes.
+// Appends the doors that person i approaches or passes to `approaching_`.
 void Crowd::find_approaches(std::size_t i, const Choice& choice) {
   const Person& person = people_[i];
   const std::vector<Gate>& gates = ways_->gates();
   const SegmentGrid::Indices near = ways_->gates_near(person.position);
   const std::size_t before = approaching_.size();
   approaching_.resize(before + near.size());
-  // As in Walls::find_near, without branches: a door that is not approached is replaced by the next
-  // one.
+  // Without branches, as in Walls::find_near: the next door replaces one that is not approached.
   Approach* end = approaching_.data() + before;
   for (const std::uint32_t k : near) {
     const Gate& gate = gates[k];
@@ -152,8 +151,8 @@ void Crowd::keep_right(std::vector<Choice>& choices) const {
     }
     if (nearest == kView) continue;
     const double turn = kMostTurn * std::sqrt(1.0 - nearest / kView);
-    // Others turn by the direction of the way, and because of whether a velocity is zero: both
-    // remain.
+    // Neither the direction of the way nor whether the velocity is zero changes, on which the
+    // turns of others depend.
     choices[i].velocity = people_[i].speed * unit(way - turn * left_of(way));
   }
 }

@@ -30,6 +30,12 @@ inline Vec nearest_on(const Segment& segment, Vec p) {
 // would be more than four million cells.
 double cell_size(Vec area, double wanted);
 
+// Returns the index of the cell at a coordinate in cells, or of the nearest one of `count` cells.
+inline std::int64_t cell_index(double coordinate, std::int64_t count) {
+  return static_cast<std::int64_t>(
+      std::min(std::max(0.0, coordinate), static_cast<double>(count - 1)));
+}
+
 // The list of a cell contains the indices of all segments within a reach of any point of the cell,
 // in ascending order, and few others, unless a condition excludes them. Immutable.
 class SegmentGrid {
@@ -58,8 +64,8 @@ class SegmentGrid {
   double reach() const { return reach_; }
   std::int64_t rows() const { return rows_; }
   // The cell of the border that is nearest to a point outside of the area counts as its cell.
-  std::int64_t column_of(double x) const { return index((x - low_.x) * per_metre_, columns_); }
-  std::int64_t row_of(double y) const { return index((y - low_.y) * per_metre_, rows_); }
+  std::int64_t column_of(double x) const { return cell_index((x - low_.x) * per_metre_, columns_); }
+  std::int64_t row_of(double y) const { return cell_index((y - low_.y) * per_metre_, rows_); }
 
   // Returns the segments near a point.
   Indices near(Vec p) const {
@@ -74,11 +80,6 @@ class SegmentGrid {
   }
 
  private:
-  static std::int64_t index(double coordinate, std::int64_t count) {
-    return static_cast<std::int64_t>(
-        std::min(std::max(0.0, coordinate), static_cast<double>(count - 1)));
-  }
-
   Vec low_, high_;
   double cell_ = 1.0;       // size of a cell [m]
   double per_metre_ = 1.0;  // 1 / `cell_`
