@@ -2,7 +2,8 @@
 """Draws the pictures of docs/pedestrians.md, which compare people with published observations.
 
 With --hour, checks instead that no person is ever inside a wall or another person, and measures how
-far people walk: 200 people in the office for an hour of simulated time, by each model.
+far people walk: 200 people in the office for an hour of simulated time, by each model. With
+--doors, prints how long opposite streams take to pass a door.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from pedestrian_scenes import (
     free_speeds,
     fundamental_diagram,
     lanes,
+    opposite_streams,
     people_of,
     weidmann,
 )
@@ -156,20 +158,28 @@ def check_hour(minutes: int, models: list[str]) -> bool:
     return is_good
 
 
+def print_doors(models: list[str]) -> None:
+    """Prints the times of opposite streams at a door, for five seeds."""
+    for model in models:
+        times = ", ".join(f"{opposite_streams(model, seed=seed):.1f}" for seed in range(1, 6))
+        print(f"{model}: 20 people from each side pass a door in {times} s", flush=True)
+
+
 def main() -> None:
-    """Draws all pictures, or checks an hour."""
+    """Draws all pictures, or carries out one of the measurements."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hour", action="store_true", help="check overlaps instead")
     parser.add_argument("--minutes", type=int, default=60, help="simulated time of this check")
-    parser.add_argument("--model", choices=list(MODELS), help="only one model in this check")
+    parser.add_argument("--doors", action="store_true", help="measure opposite streams instead")
+    parser.add_argument("--model", choices=list(MODELS), help="only one model in a measurement")
     parser.add_argument("--to", type=Path, default=CHECKOUT / "docs" / "images")
     options = parser.parse_args()
+    models = [options.model] if options.model else list(MODELS)
     if options.hour:
-        sys.exit(
-            0
-            if check_hour(options.minutes, [options.model] if options.model else list(MODELS))
-            else 1
-        )
+        sys.exit(0 if check_hour(options.minutes, models) else 1)
+    if options.doors:
+        print_doors(models)
+        return
     draw_hall(options.to / "people.png")
     draw_validation(options.to / "pedestrians.png")
 

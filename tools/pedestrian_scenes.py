@@ -244,6 +244,37 @@ def bottleneck_flow(
     return (last - first) / (passed[last] - passed[first])
 
 
+def opposite_streams(model: str, count: int = 20, seed: int = 1) -> float:
+    """Returns how long two streams take to pass a door of 1 m between two rooms [s]; NaN if longer.
+
+    Args:
+        model: The model of the people.
+        count: Number of people in each of the rooms of 8 m by 8 m, who go to the other room.
+        seed: Seed of the world.
+    """
+    side = 8.0
+    walls = [*box(-side, 0.0, side, side), (0.0, 0.0, 0.0, 3.5), (0.0, 4.5, 0.0, side)]
+    rooms = {"left": [-7.5, 0.5, -0.5, 7.5], "right": [0.5, 0.5, 7.5, 7.5]}
+    goals = {"left": [1.5, 0.5, 7.5, 7.5], "right": [-7.5, 0.5, -1.5, 7.5]}
+    groups = [
+        {
+            "name": name,
+            "count": count,
+            "area": area,
+            "waypoints": [{"area": goals[name]}],
+            "order": "once",
+        }
+        for name, area in rooms.items()
+    ]
+    from_left = np.repeat([True, False], count)
+    with scene(walls, groups, seed=seed, model=model) as world:
+        while world.time < 300.0:
+            world.step(round(0.1 / STEP))
+            if ((people_of(world).poses[:, 0] > 0.0) == from_left).all():
+                return world.time
+    return math.nan
+
+
 class Overlaps:
     """The greatest overlaps of people with walls and with each other."""
 
