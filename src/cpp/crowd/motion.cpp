@@ -26,7 +26,9 @@ constexpr double kMostAcceleration = 20.0;  // greatest acceleration of a dynami
 constexpr double kTurning = 0.2;            // time constant of the heading [s]
 constexpr double kStanding = 0.05;          // speed below which the heading remains [m/s]
 
-double normalized(double angle) { return std::remainder(angle, kTwoPi); }
+double normalized(double angle) {
+  return std::fabs(angle) <= kPi ? angle : std::remainder(angle, kTwoPi);
+}
 
 double most_speed(const Person& person) { return std::max(kMostSpeed * person.speed, 0.5); }
 

@@ -12,7 +12,6 @@ namespace flatland::crowd {
 namespace {
 
 constexpr double kAhead = 0.5;    // least cosine of the angle between the way and the door
-constexpr double kThrough = 0.3;  // least cosine of the angle between the way and the axis
 constexpr double kLane = 0.25;    // additional width of a lane on each side of the door [m]
 constexpr double kWait = 1.2;     // distance from the passage at which people wait [m]
 constexpr double kRetreat = 0.8;  // distance from the passage below which people step back [m]
@@ -29,6 +28,7 @@ constexpr double kMostTurn = 0.5;  // tangent of the greatest angle by which peo
 // Appends the doors that person i approaches or passes to `approaching_`.
 void Crowd::find_approaches(std::size_t i, const Choice& choice) {
   const Person& person = people_[i];
+  const Way& way = *way_of(target_of(person));
   const std::vector<Gate>& gates = ways_->gates();
   const SegmentGrid::Indices near = ways_->gates_near(person.position);
   const std::size_t before = approaching_.size();
@@ -37,27 +37,25 @@ void Crowd::find_approaches(std::size_t i, const Choice& choice) {
   Approach* end = approaching_.data() + before;
   for (const std::uint32_t k : near) {
     const Gate& gate = gates[k];
+    const int direction = way.through(k);
     const Vec offset = person.position - gate.center;
     const double distance2 = square(offset);
+    const double along = dot(offset, gate.axis);
     const double ahead = -dot(choice.direction, offset);
     const bool is_near = distance2 <= kGateReach * kGateReach;
-    const bool is_ahead = ahead * std::fabs(ahead) > kAhead * kAhead * distance2;
-    const bool is_along = std::fabs(dot(offset, gate.axis)) < gate.half_length();
-    const bool is_inside = is_along & (std::fabs(cross(gate.axis, offset)) < gate.half_width);
-    *end = {i, k, 0, is_inside, distance2};
-    end += static_cast<std::ptrdiff_t>(is_near & (is_ahead | is_inside));
+    const bool is_before = direction == 1 ? along < 0.0 : along > 0.0;
+    const bool is_ahead = is_before & (ahead * std::fabs(ahead) > kAhead * kAhead * distance2);
+    const bool is_inside = (std::fabs(along) < gate.half_length()) &
+                           (std::fabs(cross(gate.axis, offset)) < gate.half_width);
+    const bool is_passed = direction != Way::kNoPassage;
+    *end = {i, k, direction, is_inside, distance2};
+    end += static_cast<std::ptrdiff_t>(is_passed & is_near & (is_ahead | is_inside));
   }
-  const Way& way = *way_of(target_of(person));
   Approach* kept = approaching_.data() + before;
   for (const Approach* each = kept; each != end; ++each) {
-    const Gate& gate = gates[each->gate];
-    // The way is taken at the center: next to a door post, the way may lead in any direction.
-    const double cosine = dot(way.from_gate(each->gate), gate.axis);
-    if (std::fabs(cosine) < kThrough) continue;
-    const bool is_before = cosine * dot(person.position - gate.center, gate.axis) < 0.0;
     if (each->is_inside ||
-        (is_before && surroundings_.walls().is_clear(person.position, gate.center))) {
-      *kept++ = {i, each->gate, cosine > 0.0 ? 1 : 0, each->is_inside, std::sqrt(each->distance)};
+        surroundings_.walls().is_clear(person.position, gates[each->gate].center)) {
+      *kept++ = {i, each->gate, each->direction, each->is_inside, std::sqrt(each->distance)};
     }
   }
   approaching_.resize(static_cast<std::size_t>(kept - approaching_.data()));

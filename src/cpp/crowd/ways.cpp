@@ -1,6 +1,7 @@
 #include "crowd/ways.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <iterator>
 #include <utility>
@@ -28,8 +29,13 @@ SegmentGrid grid_of(const std::vector<Gate>& gates, const Walls& walls) {
 Way::Way(const FreeGrid& grid, std::shared_ptr<const Walls> walls, const std::vector<Gate>& gates,
          const Place& place)
     : place_(place), close_(3.0 * grid.cell()), walls_(std::move(walls)), field_(grid, place) {
-  from_gates_.reserve(gates.size());
-  for (const Gate& gate : gates) from_gates_.push_back(from(gate.center));
+  constexpr double kThrough = 0.3;  // least cosine of the angle between the way and the axis
+  passages_.reserve(gates.size());
+  for (const Gate& gate : gates) {
+    // The way is taken at the center: next to a door post, the way may lead in any direction.
+    const double cosine = dot(from(gate.center), gate.axis);
+    passages_.push_back(std::fabs(cosine) < kThrough ? kNoPassage : cosine > 0.0 ? 1 : 0);
+  }
 }
 
 Vec Way::from(Vec p) const {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -25,15 +26,16 @@ class Way {
   // Returns the unit vector of the way from a point, a zero vector if there is none. Next to the
   // place, where the directions of the grid are too coarse, the way is a straight line.
   Vec from(Vec p) const;
-  // Returns the same for the center of a gate.
-  Vec from_gate(std::size_t gate) const { return from_gates_[gate]; }
+  // Returns the direction in which the way passes a gate, see Demand; kNoPassage if it does not.
+  int through(std::size_t gate) const { return passages_[gate]; }
+  static constexpr int kNoPassage = -1;
 
  private:
   Place place_;
   double close_;  // distance from the place that counts as next to it [m]
   std::shared_ptr<const Walls> walls_;
   FlowField field_;
-  std::vector<Vec> from_gates_;
+  std::vector<std::int8_t> passages_;
 };
 
 // The ways between walls to places that people walk to again and again. Each way is computed when

@@ -102,9 +102,9 @@ void StepGuard::begin(b2World& world, float dt) {
   updates_.clear();
   float mass = 0.0F;
   for (const b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
+    if (body->GetType() == b2_kinematicBody) continue;
     const auto slot = static_cast<std::uint32_t>(id_of(body));
     if (slot >= starts_.size()) starts_.resize(slot + 1);
-    if (body->GetType() == b2_kinematicBody) continue;
     Start& start = starts_[slot];
     if (is_dynamic(body)) {
       if (start.last_jam + 1 != step_) start.jammed_steps = 0;
@@ -163,8 +163,11 @@ void StepGuard::post_solve(b2Contact* contact) noexcept {
 }
 
 std::uint64_t StepGuard::jammed_steps(b2Contact* contact) {
-  return std::max(start_of(contact->GetFixtureA()->GetBody()).jammed_steps,
-                  start_of(contact->GetFixtureB()->GetBody()).jammed_steps);
+  const auto steps_of = [this](const b2Fixture* fixture) {
+    const b2Body* body = fixture->GetBody();
+    return is_dynamic(body) ? start_of(body).jammed_steps : 0;
+  };
+  return std::max(steps_of(contact->GetFixtureA()), steps_of(contact->GetFixtureB()));
 }
 
 void StepGuard::limit_bodies(b2Contact* contact) {
