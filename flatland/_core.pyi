@@ -1641,7 +1641,7 @@ def crowd_near_walls(
     segments: Sequence[tuple[Sequence[float], Sequence[float]]],
     reach: float,
     place: Sequence[float],
-    range: float,
+    distance: float,
 ) -> tuple[list[float], float]: ...
 def crowd_is_clear(
     segments: Sequence[tuple[Sequence[float], Sequence[float]]],

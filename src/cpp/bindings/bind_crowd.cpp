@@ -408,7 +408,7 @@ void bind_formulas(py::module_& module) {
         for (const crowd::NearPoint& each : found) distances.push_back(each.distance);
         return std::pair{distances, walls.distance(to_vec(place), range)};
       },
-      py::arg("segments"), py::arg("reach"), py::arg("place"), py::arg("range"));
+      py::arg("segments"), py::arg("reach"), py::arg("place"), py::arg("distance"));
   module.def(
       "crowd_is_clear",
       [to_walls](const PySegments& segments, const PyPoint& a, const PyPoint& b) {
