@@ -9,11 +9,11 @@ root=$PWD
 venv=$root/build/learning/venv
 python=$root/.venv/bin/python
 
-# matplotlib and numpy are those of Debian.
+# matplotlib and numpy are those of Debian. The tests read results in the Parquet format with pandas.
 numpy=$("$python" -c 'import numpy; print(numpy.__version__)')
 requires=$(for extra in gym learning ray test; do
   requirements "$python" project optional-dependencies "$extra"
-done | grep -v '^flatland-sim\|^matplotlib' && echo "numpy==$numpy")
+done | grep -v '^flatland-sim\|^matplotlib' && printf '%s\n' "numpy==$numpy" "pandas>=2.1,<3")
 make_environment "PyTorch and Ray" "$venv" "$requires"
 
 . ./setup.bash
