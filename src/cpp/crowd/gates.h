@@ -11,7 +11,8 @@
 
 namespace flatland::crowd {
 
-inline constexpr double kGateReach = 4.0;  // distance within which people approach a passage [m]
+inline constexpr double kGateReach = 4.0;   // distance within which people approach a passage [m]
+inline constexpr double kThreshold = 0.35;  // space on both sides that belongs to the passage [m]
 
 // A straight passage that is too narrow for two people side by side.
 struct Gate {
@@ -20,8 +21,8 @@ struct Gate {
   double half_width = 0.0;  // [m]
   double half_depth = 0.0;  // half of the length of the narrow part along the axis [m]
 
-  // Half of the length of the passage, with the space on both sides that belongs to it [m].
-  double half_length() const { return half_depth + 0.35; }
+  // Returns half of the length of the passage with its thresholds [m].
+  double half_length() const { return half_depth + kThreshold; }
 };
 
 // Returns the narrow passages of a grid, in ascending order of x.

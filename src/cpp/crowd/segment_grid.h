@@ -20,8 +20,8 @@ struct Segment {
 inline Vec nearest_on(const Segment& segment, Vec p) {
   const Vec along = segment.b - segment.a;
   const double t = dot(p - segment.a, along) / square(along);
-  // The greater one of t and 0, which compilers make a branch of std::max. For a segment of length
-  // 0, t is NaN, of which std::min makes 1.
+  // The greater one of t and 0, without the branch that compilers generate for std::max. For a
+  // segment of length 0, t is NaN, and std::min returns 1.
   const double positive = 0.5 * (t + std::fabs(t));
   return segment.a + std::min(1.0, positive) * along;
 }
