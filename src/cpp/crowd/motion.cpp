@@ -232,6 +232,7 @@ Vec Crowd::without_contact(std::size_t i, Vec velocity, double period) {
 
 void Crowd::update(World& world, std::int64_t step, double dt) {
   const double period = dt * static_cast<double>(settings_.interval);
+  world.catch_up();
   read_people(world);
   read_surroundings(world);
   for (const Person& person : people_) {

@@ -16,10 +16,6 @@ using members::BroadPhaseMovedCount;
 using members::BroadPhaseTree;
 using members::get;
 
-b2BroadPhase& broad_phase_of(const b2World& world) {
-  return const_cast<b2BroadPhase&>(world.GetContactManager().m_broadPhase);
-}
-
 // Returns whether there is a box of a dynamic fixture that overlaps the box of a proxy, by proxy.
 std::vector<bool> find_near_dynamic(const b2World& world) {
   const b2BroadPhase& broad_phase = broad_phase_of(world);
@@ -45,6 +41,10 @@ std::vector<bool> find_near_dynamic(const b2World& world) {
 }
 
 }  // namespace
+
+b2BroadPhase& broad_phase_of(const b2World& world) {
+  return const_cast<b2BroadPhase&>(world.GetContactManager().m_broadPhase);
+}
 
 int32 pending_fixtures(const b2World& world) {
   return get<BroadPhaseMovedCount>(broad_phase_of(world));

@@ -1,9 +1,13 @@
-// A faster search for new pairs of fixtures in Box2D, for maps with thousands of edges.
+// The broad phase of Box2D, with a faster search for new pairs of fixtures, for maps with thousands
+// of edges.
 #pragma once
 
 #include <box2d/b2_world.h>
 
 namespace flatland {
+
+// Returns the broad phase of a world, to which Box2D gives only constant access.
+b2BroadPhase& broad_phase_of(const b2World& world);
 
 // Returns the number of fixtures that are pending for the search for new pairs in the next step.
 int32 pending_fixtures(const b2World& world);

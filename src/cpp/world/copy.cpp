@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "world/box2d_members.h"
+#include "world/broad_phase.h"
 #include "world/errors.h"
 #include "world/world.h"
 
@@ -284,7 +285,7 @@ class EngineCopier {
 
   void copy_broad_phase() {
     const b2BroadPhase& from = source_.GetContactManager().m_broadPhase;
-    auto& to = const_cast<b2BroadPhase&>(target_.GetContactManager().m_broadPhase);
+    b2BroadPhase& to = broad_phase_of(target_);
     assign<members::BroadPhaseProxyCount>(from, to);
     const int32 moved = get<members::BroadPhaseMovedCount>(from);
     resize(get<members::BroadPhaseMoved>(to), get<members::BroadPhaseMovedCapacity>(to),

@@ -12,6 +12,7 @@
 #include <cstdint>
 
 #include "world/box2d_members.h"
+#include "world/broad_phase.h"
 
 namespace flatland {
 namespace {
@@ -25,6 +26,12 @@ using members::get;
 // A body is clear of a fixture if their boxes are at least this far apart [m]. Box2D finds impacts
 // at distances of up to a quarter of its slop.
 constexpr float kClearance = b2_linearSlop;
+
+// For how many steps a body can coast.
+struct Room {
+  int steps = 0;
+  bool is_turning = false;  // whether the rotation has an effect on its boxes
+};
 
 bool is_moving(const b2Body& body) {
   return body.GetType() != b2_staticBody && body.IsAwake() && body.IsEnabled();
@@ -60,12 +67,17 @@ FreeState integrate(b2Body& body, float dt) {
   return state;
 }
 
-// Sets the time since which the body has been at rest. Returns whether the body stays awake.
-bool stays_awake(b2Body& body, FreeState& state, float dt, int position_iterations) {
+// Returns whether a body with a velocity cannot fall asleep.
+bool is_kept_awake(b2Body& body, b2Vec2 velocity, float omega) {
   constexpr float kLinear = b2_linearSleepTolerance * b2_linearSleepTolerance;
   constexpr float kAngular = b2_angularSleepTolerance * b2_angularSleepTolerance;
-  if (!body.IsSleepingAllowed() || state.omega * state.omega > kAngular ||
-      b2Dot(state.velocity, state.velocity) > kLinear) {
+  return !body.IsSleepingAllowed() || omega * omega > kAngular ||
+         b2Dot(velocity, velocity) > kLinear;
+}
+
+// Sets the time since which the body has been at rest. Returns whether the body stays awake.
+bool stays_awake(b2Body& body, FreeState& state, float dt, int position_iterations) {
+  if (is_kept_awake(body, state.velocity, state.omega)) {
     state.sleep_time = 0.0F;
     return true;
   }
@@ -110,6 +122,10 @@ Sides sides_of(const b2Shape& shape, const b2Transform& transform, int32 child) 
   shape.ComputeAABB(&box, transform, child);
   return sides_of(box);
 }
+
+Sides magnitude(Sides a) { return a < 0.0F ? -a : a; }
+
+float greatest(Sides a) { return b2Max(b2Max(a[0], a[1]), b2Max(a[2], a[3])); }
 
 // Returns the center of a box, and its negative.
 Sides center_of(Sides sides) {
@@ -236,20 +252,71 @@ bool meets(const Move& move, const std::vector<b2Body*>& bodies, const b2BroadPh
   return false;
 }
 
-void carry_out(const Move& move, b2BroadPhase& broad_phase) {
-  b2Body& body = *move.body;
+// Returns a bound of the distance of the points of a fixture from the center of mass, for its box.
+// The rotation of a circle has no effect on its box, so that only its center counts: 0 means that
+// the rotation of the body has no effect at all.
+float reach_of(const b2Shape& shape, const b2AABB& box, const b2Sweep& sweep) {
+  if (shape.GetType() == b2Shape::e_circle) {
+    return static_cast<const b2CircleShape&>(shape).m_p.Length() + sweep.localCenter.Length();
+  }
+  const b2Vec2 farthest = b2Max(b2Abs(box.lowerBound - sweep.c), b2Abs(box.upperBound - sweep.c));
+  return farthest.Length();
+}
+
+// Returns for how many steps a kinematic body will certainly be free and keep its boxes in the
+// broad phase, with the velocity that it has; 0 if that takes more to find out.
+Room room_of(b2Body& body, const b2BroadPhase& broad_phase, float dt) {
+  constexpr float kRounding = 0x1p-20F;  // a bound of the relative errors in a step
+  constexpr float kMany = 1000.0F;
+  const b2Vec2 velocity = body.GetLinearVelocity();
+  const float omega = body.GetAngularVelocity();
+  const b2Sweep& sweep = get<members::BodySweep>(body);
+  const float rotation = dt * b2Abs(omega) + kRounding * b2Abs(sweep.a);
+  if (body.GetContactList() != nullptr || body.GetJointList() != nullptr ||
+      !is_kept_awake(body, velocity, omega) || !(rotation < 1.0F)) {
+    return {};
+  }
+  const auto& tree = get<members::BroadPhaseTree>(broad_phase);
+  const b2Vec2 moved = dt * velocity;
+  const Sides displacement = {moved.x, moved.y, -moved.x, -moved.y};
+  Sides steps = {kMany, kMany, kMany, kMany};
+  Room room;
+  for (b2Fixture* f = body.GetFixtureList(); f != nullptr; f = f->GetNext()) {
+    if (get<members::FixtureProxyCount>(*f) != 1) return {};
+    const b2FixtureProxy& proxy = *get<members::FixtureProxies>(*f);
+    const Sides box = sides_of(*f->GetShape(), body.GetTransform(), proxy.childIndex);
+    const Sides kept = sides_of(tree.GetFatAABB(proxy.proxyId));
+    const float reach = reach_of(*f->GetShape(), box_of(box), sweep);
+    const float error = rotation * reach + kRounding * (greatest(magnitude(box)) + reach);
+    // The bounds of `keeps_box`, where the displacement has this error, too.
+    const Sides largest = fat_box(box, displacement) - 4.0F * kFatMargin;
+    const Sides slack = least(box - kept, kept - largest - b2_aabbMultiplier * error);
+    steps = least(steps, slack / (magnitude(displacement) + error));
+    room.is_turning = room.is_turning || reach > 0.0F;
+  }
+  const float n = b2Min(b2Min(steps[0], steps[1]), b2Min(steps[2], steps[3]));
+  if (n > 0.0F) room.steps = static_cast<int>(n);  // 0 for NaN
+  return room;
+}
+
+// Sets the state of a body after a step.
+void set_state(b2Body& body, const FreeState& state, const b2Transform& transform) {
   b2Sweep& sweep = get<members::BodySweep>(body);
   sweep.c0 = sweep.c;
   sweep.a0 = sweep.a;
   sweep.alpha0 = 0.0F;
-  sweep.c = move.state.center;
-  sweep.a = move.state.angle;
-  get<members::BodyTransform>(body) = move.to;
-  get<members::BodyVelocity>(body) = move.state.velocity;
-  get<members::BodyOmega>(body) = move.state.omega;
-  get<members::BodySleepTime>(body) = move.state.sleep_time;
+  sweep.c = state.center;
+  sweep.a = state.angle;
+  get<members::BodyTransform>(body) = transform;
+  get<members::BodyVelocity>(body) = state.velocity;
+  get<members::BodyOmega>(body) = state.omega;
+  get<members::BodySleepTime>(body) = state.sleep_time;
   get<members::BodyForce>(body).SetZero();
   get<members::BodyTorque>(body) = 0.0F;
+}
+
+void carry_out(const Move& move, b2BroadPhase& broad_phase) {
+  set_state(*move.body, move.state, move.to);
   auto& tree = get<members::BroadPhaseTree>(broad_phase);
   for (std::size_t i = 0; i < move.count; ++i) {
     const MovedBox& each = move.boxes[i];
@@ -261,22 +328,63 @@ void carry_out(const Move& move, b2BroadPhase& broad_phase) {
   }
 }
 
+// Moves a body by some steps of those that `room_of` has returned.
+void carry_out(b2Body& body, std::int64_t steps, bool is_turning, float dt) {
+  b2Sweep& sweep = get<members::BodySweep>(body);
+  FreeState state;
+  state.velocity = body.GetLinearVelocity();
+  state.omega = body.GetAngularVelocity();
+  // No speed is limited within the boxes.
+  const b2Vec2 translation = dt * state.velocity;
+  const float rotation = dt * state.omega;
+  for (std::int64_t i = 1; i < steps; ++i) {
+    sweep.c += translation;
+    sweep.a += rotation;
+  }
+  state.center = sweep.c + translation;
+  state.angle = sweep.a + rotation;
+  const b2Rot before = is_turning ? b2Rot(sweep.a) : body.GetTransform().q;
+  const b2Transform from = transform_of(before, sweep.c, sweep.localCenter);
+  const b2Transform to = transform_of(b2Rot(state.angle), state.center, sweep.localCenter);
+  set_state(body, state, to);
+  for (b2Fixture* f = body.GetFixtureList(); f != nullptr; f = f->GetNext()) {
+    b2FixtureProxy& proxy = *get<members::FixtureProxies>(*f);
+    const b2Shape& shape = *f->GetShape();
+    proxy.aabb = box_of(
+        least(sides_of(shape, from, proxy.childIndex), sides_of(shape, to, proxy.childIndex)));
+  }
+}
+
+void set_awake(b2Body& body, bool is_awake) {
+  // b2Body::SetAwake would also change the velocity and the time at rest.
+  const auto flag = static_cast<std::uint16_t>(expose(members::BodyAwakeFlag{}));
+  std::uint16_t& flags = get<members::BodyFlags>(body);
+  flags = static_cast<std::uint16_t>(is_awake ? flags | flag : flags & ~flag);
+}
+
 }  // namespace
 
-bool FreeMotion::begin(b2World& world, float dt, int position_iterations) {
+bool FreeMotion::begin(b2World& world, float dt, int position_iterations, bool may_coast) {
   moved_.clear();
   leaving_.clear();
   dynamic_.clear();
-  auto& broad_phase = const_cast<b2BroadPhase&>(world.GetContactManager().m_broadPhase);
+  b2BroadPhase& broad_phase = broad_phase_of(world);
   // The next step searches for new contacts of bodies that were created or moved from outside.
   if (get<members::WorldNewContacts>(world) || !get<members::WorldStepComplete>(world) ||
       get<members::BroadPhaseMovedCount>(broad_phase) > 0) {
+    catch_up();
     return false;
   }
+  world_ = &world;
+  dt_ = dt;
+  if (step_ == next_end_) finish([this](const Coasting& each) { return each.end == step_; });
+  ++step_;
+  if (pause_ > 0) --pause_;
+  may_coast = may_coast && pause_ == 0;
   bool is_all = true;
   for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
     if (body->GetType() == b2_dynamicBody) dynamic_.push_back(body);
-    if (!is_moving(*body)) continue;
+    if (!is_moving(*body) || (may_coast && coasts(*body))) continue;
     Move& move = leaving_.emplace_back();
     const bool is_free = plan(*body, broad_phase, dt, position_iterations, move);
     if (is_free && move.are_kept) {
@@ -296,17 +404,49 @@ bool FreeMotion::begin(b2World& world, float dt, int position_iterations) {
     get<members::WorldLastRate>(world) = 1.0F / dt;
     return true;
   }
+  for (const Coasting& each : coasting_) moved_.push_back(each.body);
+  catch_up();
   // Box2D ignores bodies that sleep, except if another body moves against them.
-  for (b2Body* body : moved_) {
-    get<members::BodyFlags>(*body) &= static_cast<std::uint16_t>(~expose(members::BodyAwakeFlag{}));
-  }
+  for (b2Body* body : moved_) set_awake(*body, false);
   return false;
 }
 
 void FreeMotion::end() {
-  for (b2Body* body : moved_) {
-    get<members::BodyFlags>(*body) |= static_cast<std::uint16_t>(expose(members::BodyAwakeFlag{}));
+  for (b2Body* body : moved_) set_awake(*body, true);
+}
+
+bool FreeMotion::coasts(b2Body& body) {
+  if (body.GetType() != b2_kinematicBody) return false;
+  const Room room = room_of(body, broad_phase_of(*world_), dt_);
+  if (room.steps < 2) return false;
+  const std::int64_t begin = step_ - 1;
+  coasting_.push_back({&body, begin, begin + room.steps, room.is_turning});
+  next_end_ = std::min(next_end_, coasting_.back().end);
+  set_awake(body, false);
+  return true;
+}
+
+void FreeMotion::catch_up() {
+  if (coasting_.empty()) return;
+  constexpr int kPause = 4;
+  if (step_ - coasting_.front().begin < 2) pause_ = kPause;
+  finish([](const Coasting&) { return true; });
+}
+
+template <typename Condition>
+void FreeMotion::finish(Condition condition) {
+  next_end_ = kNever;
+  std::size_t kept = 0;
+  for (const Coasting& each : coasting_) {
+    if (!condition(each)) {
+      next_end_ = std::min(next_end_, each.end);
+      coasting_[kept++] = each;
+      continue;
+    }
+    set_awake(*each.body, true);
+    carry_out(*each.body, step_ - each.begin, each.is_turning, dt_);
   }
+  coasting_.resize(kept);
 }
 
 }  // namespace flatland

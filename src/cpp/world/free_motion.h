@@ -7,6 +7,10 @@
 //
 // A body that leaves its boxes in the broad phase may get new contacts. Only a kinematic body can
 // be free then, since its contacts are those with dynamic bodies, which are few compared to walls.
+//
+// A kinematic body that has no contacts and will not leave its boxes for some steps may coast: its
+// state stays as it is, until all these steps are carried out at once. Box2D believes that it
+// sleeps, as all bodies that are moved here.
 #pragma once
 
 #include <box2d/b2_body.h>
@@ -14,6 +18,8 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 class b2World;
@@ -57,17 +63,41 @@ struct Move {
 class FreeMotion {
  public:
   // Moves all free bodies. To be called immediately before b2World::Step with the same arguments,
-  // which then ignores them.
+  // which then ignores them. Bodies may begin to coast if `may_coast` is set.
   //
   // Returns whether b2World::Step has nothing left to do, and must not be called.
-  bool begin(b2World& world, float dt, int position_iterations);
+  bool begin(b2World& world, float dt, int position_iterations, bool may_coast);
   // Must be called after b2World::Step, or in its place.
   void end();
+  // Carries out the steps of all bodies that coast. Must be called between two steps before anyone
+  // reads or changes a kinematic body, and before dt changes.
+  void catch_up();
 
  private:
+  struct Coasting {
+    b2Body* body;
+    std::int64_t begin;  // number of steps at whose end the body has its present state
+    std::int64_t end;    // number of steps at whose end the body may leave its boxes
+    bool is_turning;     // whether the rotation has an effect on its boxes
+  };
+  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
+
+  // Makes a body coast from this step on, if this is possible for more than one step.
+  bool coasts(b2Body& body);
+  template <typename Condition>
+  void finish(Condition condition);
+
   std::vector<b2Body*> moved_;
   std::vector<free_motion::Move> leaving_;
   std::vector<b2Body*> dynamic_;
+
+  std::vector<Coasting> coasting_;
+  std::int64_t step_ = 0;           // number of steps begun
+  std::int64_t next_end_ = kNever;  // the least one of `coasting_`
+  int pause_ = 0;                   // number of steps in which no body begins to coast
+  // Of the last step.
+  b2World* world_ = nullptr;
+  float dt_ = 0.0F;
 };
 
 }  // namespace flatland

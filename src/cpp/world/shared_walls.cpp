@@ -10,6 +10,7 @@
 #include <new>
 
 #include "world/box2d_members.h"
+#include "world/broad_phase.h"
 #include "world/contacts.h"
 #include "world/step_guard.h"
 
@@ -23,10 +24,6 @@ constexpr float kCellSize = 1.0F;
 constexpr float kMostCells = 1000.0F;
 // Distance from the boxes of dynamic bodies within which walls are created at least [m].
 constexpr float kMargin = 0.25F;
-
-b2BroadPhase& broad_phase_of(b2World& world) {
-  return const_cast<b2BroadPhase&>(world.GetContactManager().m_broadPhase);
-}
 
 b2FixtureProxy& proxy_of(const b2Fixture& fixture) {
   // All shapes have one child, hence one proxy.

@@ -184,6 +184,8 @@ void StepGuard::limit(b2Body* body) {
 StepReport StepGuard::end(b2World& world) {
   StepReport report;
   for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
+    // A kinematic body that sleeps, or coasts within its boxes, remains valid.
+    if (body->GetType() == b2_kinematicBody && !body->IsAwake()) continue;
     if (!is_finite(body)) {
       if (body->GetType() == b2_staticBody) {
         restore_static(body);

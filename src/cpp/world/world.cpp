@@ -101,13 +101,13 @@ StepReport World::step(double dt, int velocity_iterations, int position_iteratio
                        PreSolveHook* hook) {
   check_step(dt, velocity_iterations, position_iterations);
   const auto start = Clock::now();
-  StepReport report = step_unchecked(dt, velocity_iterations, position_iterations, hook);
+  StepReport report = step_unchecked(dt, velocity_iterations, position_iterations, hook, false);
   last_step_time_ = std::chrono::duration<double>(Clock::now() - start).count();
   return report;
 }
 
 StepReport World::step_unchecked(double dt, int velocity_iterations, int position_iterations,
-                                 PreSolveHook* hook) {
+                                 PreSolveHook* hook, bool may_coast) {
   if (!invalid_.empty()) {
     invalid_ = still_invalid();
     if (!invalid_.empty()) return {{}, invalid_};
@@ -119,7 +119,7 @@ StepReport World::step_unchecked(double dt, int velocity_iterations, int positio
   contacts_.begin_step();
   // A hook is called within the step, and may read the state of any body.
   const bool is_done =
-      hook == nullptr && free_motion_.begin(*engine_, seconds, position_iterations);
+      hook == nullptr && free_motion_.begin(*engine_, seconds, position_iterations, may_coast);
   if (!is_done) {
     walls_.create(*engine_, seconds);
     begin_step(*engine_);
@@ -147,6 +147,10 @@ void Run::check() const {
 
 RunResult World::run(const Run& run) {
   run.check();
+  struct CatchUp {
+    FreeMotion& motion;
+    ~CatchUp() { motion.catch_up(); }
+  } const at_end{free_motion_};
   const auto start = Clock::now();
   // Reading the wall time takes about as long as a step of one body.
   constexpr std::int64_t kMostUntimed = 16;
@@ -198,8 +202,9 @@ bool World::perform(const Run& run, std::int64_t time, RunResult& result) {
     }
   }
   if (stage_ == Stage::kPhysics) {
+    const bool is_last = result.steps + 1 >= run.n;
     result.report =
-        step_unchecked(run.dt, run.velocity_iterations, run.position_iterations, nullptr);
+        step_unchecked(run.dt, run.velocity_iterations, run.position_iterations, nullptr, !is_last);
     ++result.physics_steps;
     stage_ = Stage::kAfter;
     if (!result.report.empty() || contacts_.has_rows()) {

@@ -185,8 +185,12 @@ class World final : private b2DestructionListener {
     b2Body* const* body = bodies_.find(id);
     if (body == nullptr) return nullptr;
     if (has_shared_walls(**body)) own_walls();
+    if ((*body)->GetType() == b2_kinematicBody) catch_up();
     return *body;
   }
+  // Gives all bodies the states of the present time, which kinematic bodies need not have during a
+  // run. To be called by jobs before they read bodies other than by `find_body`.
+  void catch_up() { free_motion_.catch_up(); }
   b2Joint* find_joint(Id id) {
     const JointRecord* joint = joints_.find(id);
     return joint == nullptr ? nullptr : joint->joint;
@@ -252,7 +256,7 @@ class World final : private b2DestructionListener {
   void SayGoodbye(b2Fixture* fixture) override;
   std::vector<Id> still_invalid() const;
   StepReport step_unchecked(double dt, int velocity_iterations, int position_iterations,
-                            PreSolveHook* hook);
+                            PreSolveHook* hook, bool may_coast);
   // Performs the current step from the current stage on. Returns whether it is complete; otherwise,
   // the result contains what is to be done.
   bool perform(const Run& run, std::int64_t time, RunResult& result);

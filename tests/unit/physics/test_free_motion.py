@@ -15,7 +15,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from flatland.physics import PhysicsBody, PhysicsWorld
+from flatland.physics import PhysicsBody, PhysicsWorld, Run, RunEnd
+from flatland.plugin_api.update_timer import UpdateTimer
 
 # `make fuzz` compares the results of this number of other worlds.
 EXAMPLES = int(os.environ.get("FLATLAND_FUZZ", "0"))
@@ -25,8 +26,10 @@ PROPERTY = settings(
     derandomize=not EXAMPLES,
     suppress_health_check=list(HealthCheck),
 )
+RUNS = settings(PROPERTY, max_examples=EXAMPLES or 100)  # which take less time
 ROUNDS = 25  # of changes and steps of a world
 SIDE = 12.0  # m, of the room
+STEP = 5_000_000  # ns, of a run
 
 
 def two_worlds() -> tuple[PhysicsWorld, PhysicsWorld]:
@@ -37,15 +40,18 @@ def two_worlds() -> tuple[PhysicsWorld, PhysicsWorld]:
 
 
 class Pair:
-    """Two worlds that receive the same calls; only one of them leaves all bodies to Box2D."""
+    """Two worlds that receive the same calls."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, worlds: tuple[PhysicsWorld, PhysicsWorld]) -> None:
         self.rng = random.Random(seed)
         # Kinematic bodies that leave their boxes are moved without the solver if all others are.
         self.kinds = ["dynamic", "kinematic"] + self.rng.choice((["dynamic"], ["kinematic"])) * 5
-        self.worlds = two_worlds()
+        self.worlds = worlds
+        # Each contact ends a run.
+        record_contacts = self.rng.random() < 0.5
         for world in self.worlds:
-            world.record_contacts = True
+            world.record_contacts = record_contacts
+        self.time = 0  # ns, of runs
         self.bodies: list[tuple[PhysicsBody, ...]] = []
         walls = self._walls()
         self.both(
@@ -55,6 +61,11 @@ class Pair:
         )
         for _ in range(self.rng.randrange(1, 14)):
             self.add_body()
+        jobs = self.worlds[0].jobs
+        clock = UpdateTimer(self.rng.choice([3.0, 30.0])).clock(STEP)
+        seen = [pair[0] for pair in self.bodies]
+        self.reader = jobs.add_callback((1, 0), clock, is_after=True, is_counted=True, bodies=seen)
+        jobs.set_called(self.reader, False)
 
     def both(self, call: Callable[[PhysicsWorld], object]) -> None:
         for world in self.worlds:
@@ -142,6 +153,48 @@ class Pair:
         steps = (self.rng.choice([0.005, 0.005, 0.005, 0.05]), 10, self.rng.choice([10, 10, 10, 0]))
         self.both(lambda world: world.step(*steps))
 
+    def control(self) -> None:
+        """Adds a controller of a body, which reads and changes the body in each step."""
+        target = [self.rng.uniform(-1, 1) for _ in range(3)]
+        if self.rng.random() < 0.5:
+            self.change(lambda body: body.control_velocity().set_target(*target))
+        else:
+            self.change(
+                lambda body: body.control_tween(target, duration=2, mode="yoyo", easing="linear")
+            )
+
+    def run_step_by_step(self) -> None:
+        """Performs steps in a run, in which bodies may coast, and as single runs."""
+        n = self.rng.randrange(2, 100)
+        self.perform(self.worlds[0], self.time, n)
+        for _ in range(n):
+            self.perform(self.worlds[1], self.time, 1)
+            self.time += STEP
+
+    @staticmethod
+    def perform(world: PhysicsWorld, time: int, n: int) -> None:
+        continues = False
+        end = time + n * STEP
+        while time < end:
+            run = Run(time, STEP, (end - time) // STEP, 1e-9 * STEP, 10, 10, continues)
+            made, reason, *_ = world.jobs.run(*run)
+            time += made * STEP
+            continues = reason != RunEnd.DONE
+
+    def run(self) -> None:
+        """Performs steps in a run, in which bodies may coast, and one by one in the other world."""
+        first, second = self.worlds
+        n = self.rng.randrange(2, 100)
+        self.perform(first, self.time, n)
+        poses = {}
+        for _ in range(n):
+            second.step(1e-9 * STEP, 10, 10)
+            self.time += STEP
+            poses[self.time] = [pair[1].pose for pair in self.bodies]
+        for reader, _, stamp, recorded in first.jobs.take_skipped():
+            assert reader == self.reader
+            assert recorded == poses[stamp]
+
     def check(self) -> None:
         states, events = [], []
         for world in self.worlds:
@@ -163,7 +216,7 @@ class Pair:
 @PROPERTY
 @given(seed=st.integers(0, 2**32 - 1))
 def test_all_states_and_contacts_are_those_of_the_solver(seed: int) -> None:
-    pair = Pair(seed)
+    pair = Pair(seed, two_worlds())
     changes = (pair.push, pair.force, pair.move, pair.join, pair.part, pair.sense, pair.filter)
     for _ in range(ROUNDS):
         for _ in range(pair.rng.choice([0, 0, 1, 2])):
@@ -173,6 +226,34 @@ def test_all_states_and_contacts_are_those_of_the_solver(seed: int) -> None:
             pair.check()
             if not pair.is_valid:  # The world does not advance any more.
                 return
+
+
+@RUNS
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_run_with_controllers_gives_the_states_of_single_steps(seed: int) -> None:
+    pair = Pair(seed, (PhysicsWorld(), PhysicsWorld()))
+    for _ in range(pair.rng.randrange(4)):
+        pair.control()
+    for _ in range(ROUNDS):
+        for _ in range(pair.rng.choice([0, 1, 5])):
+            pair.push()
+        pair.run_step_by_step()
+        pair.check()
+        if not pair.is_valid:
+            return
+
+
+@RUNS
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_run_gives_the_states_of_single_steps_of_the_solver(seed: int) -> None:
+    pair = Pair(seed, two_worlds())
+    for _ in range(ROUNDS):
+        for _ in range(pair.rng.choice([0, 1, 5])):
+            pair.rng.choice((pair.push, pair.push, pair.push, pair.force, pair.move))()
+        pair.run()
+        pair.check()
+        if not pair.is_valid:
+            return
 
 
 @pytest.mark.parametrize("direction", [(1, 0), (-1, 0), (0, 1), (0, -1)])
@@ -195,6 +276,34 @@ def test_a_moving_platform_pushes_a_body_in_every_direction(
         paths.append(path)
         assert np.hypot(*ball.pose[:2]) > distance
     assert paths[0] == paths[1]
+
+
+@pytest.mark.parametrize(
+    "velocity", [(0, 0.7, 0), (0.3, -1, 0), (-0.3, -0.4, 0), (0, 0, 3), (0, 0, -1)]
+)
+def test_a_bar_that_coasts_hits_a_ball_in_the_step_of_the_solver(
+    velocity: tuple[float, float, float],
+) -> None:
+    states = []
+    for world in two_worlds():
+        bar = world.create_body("kinematic", (0, 0, 0))
+        bar.create_polygon([(-1, -0.05), (1, -0.05), (1, 0.05), (-1, 0.05)], density=1)
+        bar.set_velocity(*velocity)
+        places = [(x, y, 0.0) for x in (-0.5, 0.5) for y in (-0.8, 0.8)]
+        balls = [world.create_body("dynamic", place) for place in places]
+        for ball in balls:
+            ball.create_circle((0, 0), 0.2, density=1)
+        if world.pre_solve is None:
+            Pair.perform(world, 0, 400)
+        else:
+            for _ in range(400):
+                world.step(1e-9 * STEP, 10, 10)
+        states.append(world.body_states().tobytes())
+        assert any(
+            math.dist(ball.pose[:2], place[:2]) > 0.1
+            for ball, place in zip(balls, places, strict=True)
+        )
+    assert states[0] == states[1]
 
 
 LINEAR_TOLERANCE = np.float32(0.01)  # m/s
