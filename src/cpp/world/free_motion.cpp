@@ -123,15 +123,15 @@ Sides sides_of(const b2Shape& shape, const b2Transform& transform, int32 child) 
   return sides_of(box);
 }
 
-Sides magnitude(Sides a) { return a < 0.0F ? -a : a; }
+Sides magnitude(Sides a) {
+  constexpr std::int32_t kMagnitude = 0x7FFFFFFF;
+  return __builtin_bit_cast(Sides, __builtin_bit_cast(SideMask, a) & kMagnitude);
+}
 
-float greatest(Sides a) { return b2Max(b2Max(a[0], a[1]), b2Max(a[2], a[3])); }
+Sides opposite(Sides a) { return Sides{a[2], a[3], a[0], a[1]}; }
 
 // Returns the center of a box, and its negative.
-Sides center_of(Sides sides) {
-  const Sides opposite = {sides[2], sides[3], sides[0], sides[1]};
-  return 0.5F * (sides - opposite);
-}
+Sides center_of(Sides sides) { return 0.5F * (sides - opposite(sides)); }
 
 // Returns the box of a fixture in the broad phase after a move, as in b2DynamicTree::MoveProxy. The
 // displacement is that of all sides.
@@ -264,9 +264,11 @@ float reach_of(const b2Shape& shape, const b2AABB& box, const b2Sweep& sweep) {
 }
 
 // Returns for how many steps a kinematic body will certainly be free and keep its boxes in the
-// broad phase, with the velocity that it has; 0 if that takes more to find out.
+// broad phase, with the velocity that it has; 0 for less than two steps, or if that takes more to
+// find out.
 Room room_of(b2Body& body, const b2BroadPhase& broad_phase, float dt) {
   constexpr float kRounding = 0x1p-20F;  // a bound of the relative errors in a step
+  constexpr float kFew = 2.0F;
   constexpr float kMany = 1000.0F;
   const b2Vec2 velocity = body.GetLinearVelocity();
   const float omega = body.GetAngularVelocity();
@@ -287,15 +289,17 @@ Room room_of(b2Body& body, const b2BroadPhase& broad_phase, float dt) {
     const Sides box = sides_of(*f->GetShape(), body.GetTransform(), proxy.childIndex);
     const Sides kept = sides_of(tree.GetFatAABB(proxy.proxyId));
     const float reach = reach_of(*f->GetShape(), box_of(box), sweep);
-    const float error = rotation * reach + kRounding * (greatest(magnitude(box)) + reach);
+    const Sides size = magnitude(box) + magnitude(opposite(box));  // at least that of the center
+    const Sides error = rotation * reach + kRounding * (size + reach);
     // The bounds of `keeps_box`, where the displacement has this error, too.
     const Sides largest = fat_box(box, displacement) - 4.0F * kFatMargin;
     const Sides slack = least(box - kept, kept - largest - b2_aabbMultiplier * error);
     steps = least(steps, slack / (magnitude(displacement) + error));
     room.is_turning = room.is_turning || reach > 0.0F;
   }
-  const float n = b2Min(b2Min(steps[0], steps[1]), b2Min(steps[2], steps[3]));
-  if (n > 0.0F) room.steps = static_cast<int>(n);  // 0 for NaN
+  if (!is_true(steps >= kFew)) return {};  // nor NaN
+  const Sides least_of_axes = least(steps, opposite(steps));
+  room.steps = static_cast<int>(b2Min(least_of_axes[0], least_of_axes[1]));
   return room;
 }
 
@@ -418,7 +422,7 @@ void FreeMotion::end() {
 bool FreeMotion::coasts(b2Body& body) {
   if (body.GetType() != b2_kinematicBody) return false;
   const Room room = room_of(body, broad_phase_of(*world_), dt_);
-  if (room.steps < 2) return false;
+  if (room.steps == 0) return false;
   const std::int64_t begin = step_ - 1;
   coasting_.push_back({&body, begin, begin + room.steps, room.is_turning});
   next_end_ = std::min(next_end_, coasting_.back().end);
