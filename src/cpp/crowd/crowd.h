@@ -19,7 +19,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -146,11 +145,14 @@ class Crowd {
   Stance stance_of(const Person& person, const Choice& choice) const;
   void give_way(std::vector<Choice>& choices, std::int64_t step, double dt, double period);
   void ask_for_room(std::size_t root, const std::vector<Choice>& choices,
-                    const std::vector<Stance>& stances, std::vector<bool>& is_asked,
-                    std::int64_t until);
+                    std::vector<bool>& is_asked, std::int64_t until);
 
   // motion.cpp: how a person moves.
   void find_neighbours();
+  // Computes the repulsions of the neighbours a and b by each other; their places in the list of
+  // the other one's neighbours are given.
+  void find_pushes(std::uint32_t a, std::uint32_t place_of_b, std::uint32_t b,
+                   std::uint32_t place_of_a);
   // Returns the gap below which walls have an effect on the velocity that a person wants.
   double wall_sight(const Person& person) const;
   // Returns the distance within which walls have an effect on the motion of a person.
@@ -175,7 +177,7 @@ class Crowd {
   std::uint32_t next_party_ = 0;                    // number of the next party
 
   Surroundings surroundings_;
-  std::unordered_set<Id> own_;                      // bodies and legs of all people
+  IdSet own_;                                       // bodies and legs of all people
   std::shared_ptr<Ways> ways_;                      // null in a world without walls
   bool has_grid_ = false;                           // whether `ways_` and `way_to_` match the walls
   std::vector<std::shared_ptr<const Way>> way_to_;  // by waypoint, null if not needed yet
@@ -186,7 +188,13 @@ class Crowd {
   std::vector<std::uint32_t> guests_;  // number of people who stand at each waypoint
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;  // people who see each other
   std::vector<std::uint32_t> neighbours_, neighbour_starts_;
+  std::vector<std::uint32_t> next_;   // the next place of each person in `neighbours_`
+  std::vector<Vec> pushes_;           // repulsion by each of `neighbours_`
+  std::vector<std::uint32_t> gates_;  // that a person may approach
   std::vector<Approach> approaching_;
+  std::vector<Choice> choices_;
+  std::vector<Stance> stances_;
+  std::vector<Signal> next_signals_;
   std::vector<Vec> chosen_;            // wanted velocities, and then those of the motion
   std::size_t decided_ = 0;            // number of people whose velocity of the motion is chosen
   std::vector<NearPoint> near_walls_;  // within reach of each person

@@ -111,6 +111,7 @@ std::vector<Gate> find_gates(const FreeGrid& grid, const Walls& walls) {
       gate.half_depth = std::max(gate.half_depth, std::fabs(dot(from_center, gate.axis)));
       offset = std::max(offset, std::fabs(cross(from_center, gate.axis)));
     }
+    gate.radius2 = square({gate.half_length(), gate.half_width});
     // A cluttered place has no axis.
     if (gate.half_depth <= kMostDepth && offset <= kMostOffset) gates.push_back(gate);
   }

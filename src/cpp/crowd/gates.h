@@ -1,6 +1,7 @@
 // Doors and other narrow passages. People pass a gate in one direction at a time.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -20,9 +21,15 @@ struct Gate {
   Vec axis;                 // unit vector along the passage
   double half_width = 0.0;  // [m]
   double half_depth = 0.0;  // half of the length of the narrow part along the axis [m]
+  double radius2 = 0.0;     // square of the radius of a disc that contains the passage [m²]
 
   // Returns half of the length of the passage with its thresholds [m].
   double half_length() const { return half_depth + kThreshold; }
+  // Returns whether a point at an offset from the center is in the passage.
+  bool contains(Vec offset) const {
+    return std::fabs(dot(offset, axis)) < half_length() &&
+           std::fabs(cross(axis, offset)) < half_width;
+  }
 };
 
 // Returns the narrow passages of a grid, in ascending order of x.

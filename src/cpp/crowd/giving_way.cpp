@@ -42,12 +42,12 @@ Crowd::Stance Crowd::stance_of(const Person& person, const Choice& choice) const
 }
 
 void Crowd::give_way(std::vector<Choice>& choices, std::int64_t step, double dt, double period) {
-  std::vector<Stance> stances(people_.size());
+  stances_.resize(people_.size());
   std::vector<std::size_t> blocked;
   for (std::size_t i = 0; i < people_.size(); ++i) {
     Person& person = people_[i];
-    stances[i] = stance_of(person, choices[i]);
-    const bool is_walking = stances[i] == Stance::kWalking;
+    stances_[i] = stance_of(person, choices[i]);
+    const bool is_walking = stances_[i] == Stance::kWalking;
     const bool is_slow =
         is_walking && dot(person.velocity, choices[i].direction) < kSlow * person.speed;
     person.delay = std::min(std::max(person.delay + (is_slow ? period : -kRecovery * period), 0.0),
@@ -58,16 +58,16 @@ void Crowd::give_way(std::vector<Choice>& choices, std::int64_t step, double dt,
   std::sort(blocked.begin(), blocked.end(),
             [this](std::size_t a, std::size_t b) { return precedes(people_[a], people_[b]); });
   const auto until = step + static_cast<std::int64_t>(std::ceil(kHold / dt));
-  std::vector<bool> is_asked(people_.size());
+  std::vector<bool> is_asked(blocked.empty() ? 0 : people_.size());
   for (const std::size_t i : blocked) {
-    if (!is_asked[i]) ask_for_room(i, choices, stances, is_asked, until);
+    if (!is_asked[i]) ask_for_room(i, choices, is_asked, until);
   }
   for (std::size_t i = 0; i < people_.size(); ++i) {
     Person& person = people_[i];
     if (person.yields_to == kNone) continue;
     const Person* other = numbered(person.yields_to);
     const bool is_over =
-        other == nullptr || step >= person.yield_until || stances[i] == Stance::kFixed;
+        other == nullptr || step >= person.yield_until || stances_[i] == Stance::kFixed;
     if (is_over) {
       person.yields_to = kNone;
       person.yield_until = 0;
@@ -84,8 +84,7 @@ void Crowd::give_way(std::vector<Choice>& choices, std::int64_t step, double dt,
 }
 
 void Crowd::ask_for_room(std::size_t root, const std::vector<Choice>& choices,
-                         const std::vector<Stance>& stances, std::vector<bool>& is_asked,
-                         std::int64_t until) {
+                         std::vector<bool>& is_asked, std::int64_t until) {
   const Person& first = people_[root];
   const std::uint32_t target = target_of(first);
   std::vector<std::size_t> asking{root};
@@ -98,8 +97,8 @@ void Crowd::ask_for_room(std::size_t root, const std::vector<Choice>& choices,
     for (std::uint32_t k = neighbour_starts_[i]; k < neighbour_starts_[i + 1]; ++k) {
       const std::size_t j = neighbours_[k];
       Person& other = people_[j];
-      if (is_asked[j] || stances[j] == Stance::kFixed) continue;
-      const bool is_walking = stances[j] == Stance::kWalking;
+      if (is_asked[j] || stances_[j] == Stance::kFixed) continue;
+      const bool is_walking = stances_[j] == Stance::kWalking;
       if (is_walking && (first.delay < kStuck || !precedes(first, other))) continue;
       const Vec offset = other.position - person.position;
       const double reach = person.radius + other.radius;

@@ -68,11 +68,29 @@ void Crowd::find_neighbours() {
   }
   std::partial_sum(neighbour_starts_.begin(), neighbour_starts_.end(), neighbour_starts_.begin());
   neighbours_.resize(2 * pairs_.size());
-  std::vector<std::uint32_t> next(neighbour_starts_.begin(), neighbour_starts_.end() - 1);
+  pushes_.resize(neighbours_.size());
+  next_.assign(neighbour_starts_.begin(), neighbour_starts_.end() - 1);
   for (const auto& [a, b] : pairs_) {
-    neighbours_[next[a]++] = b;
-    neighbours_[next[b]++] = a;
+    const std::uint32_t place_of_b = next_[a]++;
+    const std::uint32_t place_of_a = next_[b]++;
+    neighbours_[place_of_b] = b;
+    neighbours_[place_of_a] = a;
+    if (settings_.model == Settings::Model::kSocialForce) find_pushes(a, place_of_b, b, place_of_a);
   }
+}
+
+void Crowd::find_pushes(std::uint32_t a, std::uint32_t place_of_b, std::uint32_t b,
+                        std::uint32_t place_of_a) {
+  const SocialForces& forces = settings_.forces;
+  const Person& one = people_[a];
+  const Person& other = people_[b];
+  const Vec offset = one.position - other.position;
+  pushes_[place_of_b] = repulsion(forces, offset, other.velocity - forces.relative * one.velocity);
+  // Opposite arguments have opposite results, except at the same place.
+  const bool is_opposite = forces.relative == 1.0 && square(offset) > 1e-18;
+  pushes_[place_of_a] =
+      is_opposite ? -pushes_[place_of_b]
+                  : repulsion(forces, -offset, one.velocity - forces.relative * other.velocity);
 }
 
 double Crowd::wall_sight(const Person& person) const {
@@ -116,7 +134,7 @@ Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, d
     }
     // A person without progress presses forward, and is not repelled by people who make room.
     if (other.yields_to == person.number && person.delay > 0.0) continue;
-    const Vec push = repulsion(forces, offset, other.velocity - forces.relative * person.velocity);
+    const Vec push = pushes_[k];
     if (square(push) < kNegligible * kNegligible) continue;
     if (!walls.is_clear(person.position, other.position)) continue;
     sum += view_weight(forces, choice.direction, push) * push;
@@ -242,17 +260,17 @@ void Crowd::update(World& world, std::int64_t step, double dt) {
   find_neighbours();
   find_walls(period);
   count_guests();
-  std::vector<Choice> choices(people_.size());
+  choices_.resize(people_.size());
   for (std::size_t i = 0; i < people_.size(); ++i) {
-    choices[i] = choose(people_[i], step, dt, period);
+    choices_[i] = choose(people_[i], step, dt, period);
   }
-  keep_doors_clear(choices, step, dt);
-  keep_right(choices);
-  give_way(choices, step, dt, period);
+  keep_doors_clear(choices_, step, dt);
+  keep_right(choices_);
+  give_way(choices_, step, dt, period);
   chosen_.resize(people_.size());
   for (std::size_t i = 0; i < people_.size(); ++i) {
     const Person& person = people_[i];
-    const Choice& choice = choices[i];
+    const Choice& choice = choices_[i];
     Vec preferred = choice.velocity;
     if (square(preferred) > 0.0) {
       preferred += settings_.fluctuation * normal(settings_.key, kFluctuations + person.number,
@@ -265,7 +283,7 @@ void Crowd::update(World& world, std::int64_t step, double dt) {
   for (decided_ = 0; decided_ < people_.size(); ++decided_) {
     const std::size_t i = decided_;
     if (!settings_.is_dynamic) chosen_[i] = without_contact(i, chosen_[i], period);
-    move_body(world, i, choices[i], chosen_[i], period);
+    move_body(world, i, choices_[i], chosen_[i], period);
   }
 }
 

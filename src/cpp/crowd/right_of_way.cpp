@@ -31,34 +31,39 @@ void Crowd::find_approaches(std::size_t i, const Choice& choice) {
   const Way& way = *way_of(target_of(person));
   const std::vector<Gate>& gates = ways_->gates();
   const SegmentGrid::Indices near = ways_->gates_near(person.position);
-  const std::size_t before = approaching_.size();
-  approaching_.resize(before + near.size());
+  const auto is_ahead = [&](const Gate& gate, int direction, Vec offset, double distance2) {
+    // The direction of the passage, 1 or -1. A comparison of it would be a branch.
+    const double sign = 2.0 * direction - 1.0;
+    const double ahead = -dot(choice.direction, offset);
+    return (sign * dot(offset, gate.axis) < 0.0) &
+           (ahead * std::fabs(ahead) > kAhead * kAhead * distance2);
+  };
   // Without branches, as in Walls::find_near: the next door replaces one that is not approached.
-  Approach* end = approaching_.data() + before;
+  gates_.resize(near.size());
+  std::uint32_t* end = gates_.data();
   for (const std::uint32_t k : near) {
     const Gate& gate = gates[k];
     const int direction = way.through(k);
     const Vec offset = person.position - gate.center;
     const double distance2 = square(offset);
-    const double along = dot(offset, gate.axis);
-    const double ahead = -dot(choice.direction, offset);
     const bool is_near = distance2 <= kGateReach * kGateReach;
-    const bool is_before = direction == 1 ? along < 0.0 : along > 0.0;
-    const bool is_ahead = is_before & (ahead * std::fabs(ahead) > kAhead * kAhead * distance2);
-    const bool is_inside = (std::fabs(along) < gate.half_length()) &
-                           (std::fabs(cross(gate.axis, offset)) < gate.half_width);
     const bool is_passed = direction != Way::kNoPassage;
-    *end = {i, k, direction, is_inside, distance2};
-    end += static_cast<std::ptrdiff_t>(is_passed & is_near & (is_ahead | is_inside));
+    const bool may_be_inside = distance2 < gate.radius2;
+    *end = k;
+    end += static_cast<std::ptrdiff_t>(
+        is_passed & is_near & (is_ahead(gate, direction, offset, distance2) | may_be_inside));
   }
-  Approach* kept = approaching_.data() + before;
-  for (const Approach* each = kept; each != end; ++each) {
-    if (each->is_inside ||
-        surroundings_.walls().is_clear(person.position, gates[each->gate].center)) {
-      *kept++ = {i, each->gate, each->direction, each->is_inside, std::sqrt(each->distance)};
+  for (const std::uint32_t* k = gates_.data(); k != end; ++k) {
+    const Gate& gate = gates[*k];
+    const int direction = way.through(*k);
+    const Vec offset = person.position - gate.center;
+    const double distance2 = square(offset);
+    const bool is_inside = gate.contains(offset);
+    if (is_inside || (is_ahead(gate, direction, offset, distance2) &&
+                      surroundings_.walls().is_clear(person.position, gate.center))) {
+      approaching_.push_back({i, *k, direction, is_inside, std::sqrt(distance2)});
     }
   }
-  approaching_.resize(static_cast<std::size_t>(kept - approaching_.data()));
 }
 
 Crowd::Choice Crowd::step_aside(const Person& person, const Choice& choice,
@@ -87,8 +92,7 @@ Signal Crowd::signal_of(std::uint32_t gate) const {
 void Crowd::update_signals(std::int64_t step, double dt) {
   std::sort(approaching_.begin(), approaching_.end(),
             [](const Approach& a, const Approach& b) { return a.gate < b.gate; });
-  std::vector<Signal> signals;
-  signals.reserve(approaching_.size());
+  next_signals_.clear();
   for (auto each = approaching_.begin(); each != approaching_.end();) {
     Signal signal = signal_of(each->gate);
     Demand demand;
@@ -102,9 +106,9 @@ void Crowd::update_signals(std::int64_t step, double dt) {
       }
     }
     signal.update(demand, step, dt);
-    signals.push_back(signal);
+    next_signals_.push_back(signal);
   }
-  signals_ = std::move(signals);
+  std::swap(signals_, next_signals_);
 }
 
 void Crowd::keep_doors_clear(std::vector<Choice>& choices, std::int64_t step, double dt) {

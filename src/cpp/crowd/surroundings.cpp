@@ -63,31 +63,36 @@ double Obstacle::gap(Vec p, Vec& away) const {
   return std::sqrt(nearest);
 }
 
+Surroundings::Key Surroundings::key_of(const b2Body& body) {
+  return {{id_of(&body), id_of(body.GetFixtureList())},
+          {body.GetPosition().x, body.GetPosition().y, body.GetAngle()}};
+}
+
 bool Surroundings::counts(const b2Fixture& fixture) const {
   const b2Filter& filter = fixture.GetFilterData();
   return !fixture.IsSensor() && (filter.categoryBits & bits_) != 0 && filter.maskBits != 0;
 }
 
-bool Surroundings::read(const b2World& engine, const std::unordered_set<Id>& own) {
-  std::vector<Key> keys;
-  std::vector<const b2Body*> fixed;
+bool Surroundings::read(const b2World& engine, const IdSet& own) {
+  fixed_.clear();
   obstacles_.clear();
   for (const b2Body* body = engine.GetBodyList(); body != nullptr; body = body->GetNext()) {
-    const b2Fixture* newest = body->GetFixtureList();
-    if (newest == nullptr || own.count(id_of(body)) != 0) continue;
+    if (body->GetFixtureList() == nullptr || own.contains(id_of(body))) continue;
     if (body->GetType() == b2_staticBody) {
-      keys.push_back({{id_of(body), id_of(newest)},
-                      {body->GetPosition().x, body->GetPosition().y, body->GetAngle()}});
-      fixed.push_back(body);
+      fixed_.push_back(body);
     } else {
       add_obstacles(*body);
     }
   }
-  if (keys == keys_) return false;
+  const auto is_known = [](const Key& key, const b2Body* body) { return key == key_of(*body); };
+  if (std::equal(keys_.begin(), keys_.end(), fixed_.begin(), fixed_.end(), is_known)) return false;
   std::vector<Segment> segments;
-  for (const b2Body* body : fixed) add_segments(*body, segments);
+  keys_.clear();
+  for (const b2Body* body : fixed_) {
+    add_segments(*body, segments);
+    keys_.push_back(key_of(*body));
+  }
   walls_ = std::make_shared<const Walls>(std::move(segments), walls_->reach());
-  keys_ = std::move(keys);
   return true;
 }
 

@@ -38,7 +38,7 @@ class Surroundings {
   explicit Surroundings(std::uint16_t bits = 0) : bits_(bits) {}
 
   // Reads all bodies except `own`. Returns whether the walls have changed.
-  bool read(const b2World& engine, const std::unordered_set<Id>& own);
+  bool read(const b2World& engine, const IdSet& own);
   // Allows queries of the walls up to a range.
   void extend(double reach);
 
@@ -55,12 +55,14 @@ class Surroundings {
     bool operator==(const Key& other) const { return ids == other.ids && pose == other.pose; }
   };
 
+  static Key key_of(const b2Body& body);
   bool counts(const b2Fixture& fixture) const;
   void add_segments(const b2Body& body, std::vector<Segment>& segments) const;
   void add_obstacles(const b2Body& body);
 
   std::uint16_t bits_;
-  std::vector<Key> keys_;
+  std::vector<Key> keys_;             // of the bodies of the walls
+  std::vector<const b2Body*> fixed_;  // valid within `read`
   std::shared_ptr<const Walls> walls_ = std::make_shared<const Walls>(std::vector<Segment>{}, 0.0);
   std::vector<Obstacle> obstacles_;
 };

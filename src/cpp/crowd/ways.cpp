@@ -18,7 +18,7 @@ SegmentGrid grid_of(const std::vector<Gate>& gates, const Walls& walls) {
   const auto is_listed = [&](std::uint32_t i, Vec low, Vec high) {
     const Gate& gate = gates[i];
     const Vec center = 0.5 * (low + high);
-    const double reach = length({gate.half_length(), gate.half_width}) + length(high - center);
+    const double reach = std::sqrt(gate.radius2) + length(high - center);
     return length(gate.center - center) <= reach || !walls.is_hidden(gate.center, low, high);
   };
   return {centers, kCell, kGateReach, is_listed};

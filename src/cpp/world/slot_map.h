@@ -129,4 +129,22 @@ class SlotMap {
   std::size_t size_ = 0;
 };
 
+// Ids of one kind, of objects that exist at the same time.
+class IdSet {
+ public:
+  void insert(Id id) {
+    if (slot_of(id) >= ids_.size()) ids_.resize(slot_of(id) + 1);
+    ids_[slot_of(id)] = id;
+  }
+  void erase(Id id) {
+    if (contains(id)) ids_[slot_of(id)] = 0;
+  }
+  bool contains(Id id) const { return slot_of(id) < ids_.size() && ids_[slot_of(id)] == id; }
+
+ private:
+  static std::size_t slot_of(Id id) { return static_cast<std::uint32_t>(id); }
+
+  std::vector<Id> ids_;  // by slot, 0 for none
+};
+
 }  // namespace flatland

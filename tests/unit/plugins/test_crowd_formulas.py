@@ -46,6 +46,15 @@ def test_the_repulsion_is_the_gradient_of_the_elliptic_potential() -> None:
     assert crowd_repulsion((x, y), velocity, numbers) == pytest.approx(expected, rel=1e-6)
 
 
+def test_repulsions_of_opposite_arguments_are_opposite() -> None:
+    numbers = {"strength": 1.5, "range": 0.3, "look_ahead": 1.0}
+    rng = np.random.default_rng(1)
+    for scale in (1.0, 0.1, 1e-6, 1e-9):
+        for x, y, vx, vy in (rng.normal(size=(100, 4)) * (scale, scale, 1, 1)).tolist():
+            push = crowd_repulsion((x, y), (vx, vy), numbers)
+            assert crowd_repulsion((-x, -y), (-vx, -vy), numbers) == (-push[0], -push[1])
+
+
 def test_a_wall_repels_exponentially_with_the_distance_from_the_circumference() -> None:
     x, y = crowd_wall_repulsion((0.0, -0.5), 0.2, {"wall_strength": 5.0, "wall_range": 0.1})
     assert (x, y) == pytest.approx((0.0, -5.0 * math.exp(-3.0)))

@@ -9,6 +9,7 @@ import pytest
 from rooms_with_people import CALM, DOOR, ONE, ROOM, SHELF, load, people_of
 
 from flatland import Body, World
+from flatland._core import crowd_repulsion
 from flatland.errors import PluginError, WorldError
 from tests.unit.conftest import WorldFiles
 
@@ -38,6 +39,31 @@ def test_walls_repel_at_the_distance_that_follows_from_the_range(
     people.spawn(poses=[(6.0, 2.5, 0.0)])
     world.step(200)
     assert (people.people.poses[0, 1] > 2.52) == is_pushed
+
+
+@pytest.mark.parametrize("relative", [1.0, 0.3])
+def test_people_repel_each_other_according_to_their_velocities(
+    files: WorldFiles, relative: float
+) -> None:
+    numbers = {"strength": 1.5, "range": 0.3, "look_ahead": 1.0}
+    forces = f"relative: {relative}, behind: 1, wall_strength: 0, strength: 1.5, look_ahead: 1"
+    hall = ["#" * 42, *["#" + " " * 40 + "#"] * 20, "#" * 42]
+    world = load(files, ONE % "[39, 10]", CALM + f"social_force: {{{forces}}}, ", hall)
+    people = people_of(world)
+    people.spawn(poses=[(4.0, 10.2, 0.0), (4.6, 9.8, 0.0)])
+    for _ in range(4):
+        world.step(10)
+        places, before = people.people.poses[:, :2], people.people.velocities[:, :2]
+        world.step(1)  # with an update
+        changes = (people.people.velocities[:, :2] - before) / 0.05
+        for i, j in ((0, 1), (1, 0)):
+            way = np.array([39.0, 10.0]) - places[i]
+            driving = (1.2 * way / np.hypot(*way) - before[i]) / 0.5
+            velocity = before[j] - relative * before[i]
+            push = crowd_repulsion(tuple(places[i] - places[j]), tuple(velocity), numbers)
+            assert changes[i] == pytest.approx(driving + push, abs=0.03)
+            assert math.hypot(*push) > 0.09
+        world.step(9)
 
 
 def two_people(files: WorldFiles, left_y: float, right_y: float, options: str = "") -> World:
