@@ -2,6 +2,7 @@
 #include <pybind11/stl.h>
 
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <string>
 #include <tuple>
@@ -145,19 +146,18 @@ class PyAgentBatch {
   class Uses {
    public:
     Uses(const std::vector<Agent>& agents, const AgentCommands& commands) {
-      uses_.reserve(agents.size());
       const World* last = nullptr;
       for (std::size_t i = 0; i < agents.size(); ++i) {
         World& world = *agents[i].world;
         if ((!commands.acts[i] && !commands.observes[i]) || &world == last) continue;
-        uses_.push_back(std::make_unique<World::ExclusiveUse>(world, World::kStepping));
+        uses_.emplace_back(world, World::kStepping);
         last = &world;
       }
     }
     void end() { uses_.clear(); }
 
    private:
-    std::vector<std::unique_ptr<World::ExclusiveUse>> uses_;
+    std::deque<World::ExclusiveUse> uses_;
   };
 
   // Throws a ValueError unless a batch may contain both agents.

@@ -460,8 +460,9 @@ World::ExclusiveUse::ExclusiveUse(World& world, const char* activity) : world_(&
     world.wait_for_readers();
     users = 0;
   }
-  world.activity_ = activity;
-  world.owner_ = std::this_thread::get_id();
+  // Other threads only tell from these that they do not own the use.
+  world.activity_.store(activity, std::memory_order_relaxed);
+  world.owner_.store(std::this_thread::get_id(), std::memory_order_relaxed);
   if (world.closed()) {
     end();
     throw StaleHandleError("the world is closed");
@@ -470,9 +471,9 @@ World::ExclusiveUse::ExclusiveUse(World& world, const char* activity) : world_(&
 
 void World::ExclusiveUse::end() {
   if (world_ == nullptr) return;
-  world_->activity_ = nullptr;
-  world_->owner_ = std::thread::id();
-  world_->users_ = 0;
+  world_->activity_.store(nullptr, std::memory_order_relaxed);
+  world_->owner_.store(std::thread::id(), std::memory_order_relaxed);
+  world_->users_.store(0, std::memory_order_release);
   world_ = nullptr;
 }
 
