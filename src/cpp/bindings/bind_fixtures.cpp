@@ -81,7 +81,7 @@ std::optional<PyMaterial> material_of(const FixtureHandle& fixture) {
   World& world = fixture.core();
   world.read_fixture(fixture.id);
   const Materials& materials = world.rays().materials();
-  const std::uint16_t number = materials.number_of(RayScene::Fixtures::slot_of(fixture.id));
+  const std::uint16_t number = materials.number_of(flatland::slot_of(fixture.id));
   if (number == 0) return std::nullopt;
   const Material& material = materials.at(number);
   return make_value<PyMaterial>(material.reflectance, material.transmission, material.specular);

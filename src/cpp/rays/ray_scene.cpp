@@ -12,9 +12,7 @@
 namespace flatland {
 namespace {
 
-std::uint32_t slot_of(const b2Fixture* fixture) {
-  return RayScene::Fixtures::slot_of(id_of(fixture));
-}
+std::uint32_t slot_of(const b2Fixture* fixture) { return flatland::slot_of(id_of(fixture)); }
 
 void collect_edges(const b2Body& body, const Materials& materials, std::vector<TreeEdge>& edges) {
   for (const b2Fixture* f = body.GetFixtureList(); f != nullptr; f = f->GetNext()) {

@@ -32,7 +32,7 @@ Id body_b_of(const b2Contact* contact) {
 }  // namespace
 
 void ContactRecorder::record_body(Id body, std::uint8_t kinds) {
-  const auto slot = static_cast<std::uint32_t>(body);
+  const std::uint32_t slot = slot_of(body);
   if (slot >= kinds_of_body_.size()) {
     if (kinds == 0) return;
     kinds_of_body_.resize(slot + 1);
@@ -49,7 +49,7 @@ bool ContactRecorder::is_recording() const {
 bool ContactRecorder::records(const b2Contact* contact, ContactKind kind) const {
   if (recording) return true;
   const auto kinds = [this](Id body) -> int {
-    const auto slot = static_cast<std::uint32_t>(body);
+    const std::uint32_t slot = slot_of(body);
     return slot < kinds_of_body_.size() ? kinds_of_body_[slot] : 0;
   };
   const int recorded = kinds_of_all_ | kinds(body_a_of(contact)) | kinds(body_b_of(contact));

@@ -26,6 +26,9 @@ enum class IdKind : std::uint64_t {
   kCrowd = 7
 };
 
+// Returns the part of an id that identifies an object among those of its kind that exist.
+inline std::uint32_t slot_of(Id id) { return static_cast<std::uint32_t>(id); }
+
 // Values by id. The id of an erased value is never valid again, even if its slot is reused.
 template <typename Value, IdKind kKind>
 class SlotMap {
@@ -47,14 +50,12 @@ class SlotMap {
 
   // Returns the value, or null if the id is unknown or its value was erased.
   Value* find(Id id) {
-    const auto slot = static_cast<std::uint32_t>(id);
+    const std::uint32_t slot = slot_of(id);
     if (slot >= slots_.size() || !slots_[slot].is_used() || make_id(slot) != id) return nullptr;
     return &slots_[slot].value;
   }
   const Value* find(Id id) const { return const_cast<SlotMap*>(this)->find(id); }
 
-  // The part of an id that identifies the value among those that exist.
-  static std::uint32_t slot_of(Id id) { return static_cast<std::uint32_t>(id); }
   // Returns the value in a slot, or null if the slot is free.
   const Value* at_slot(std::uint32_t slot) const {
     return slot < slots_.size() && slots_[slot].is_used() ? &slots_[slot].value : nullptr;
@@ -62,7 +63,7 @@ class SlotMap {
 
   void erase(Id id) {
     if (find(id) == nullptr) return;
-    const auto slot = static_cast<std::uint32_t>(id);
+    const std::uint32_t slot = slot_of(id);
     slots_[slot].value = Value{};
     slots_[slot].generation = kUnused;
     --size_;
@@ -133,7 +134,7 @@ class SlotMap {
 class IdSet {
  public:
   void insert(Id id) {
-    if (slot_of(id) >= ids_.size()) ids_.resize(slot_of(id) + 1);
+    if (slot_of(id) >= ids_.size()) ids_.resize(std::size_t{slot_of(id)} + 1);
     ids_[slot_of(id)] = id;
   }
   void erase(Id id) {
@@ -142,8 +143,6 @@ class IdSet {
   bool contains(Id id) const { return slot_of(id) < ids_.size() && ids_[slot_of(id)] == id; }
 
  private:
-  static std::size_t slot_of(Id id) { return static_cast<std::uint32_t>(id); }
-
   std::vector<Id> ids_;  // by slot, 0 for none
 };
 

@@ -83,12 +83,10 @@ bool is_finite(const b2Body* body) {
                        body->GetAngularVelocity());
 }
 
-StepGuard::Start& StepGuard::start_of(const b2Body* body) {
-  return starts_[static_cast<std::uint32_t>(id_of(body))];
-}
+StepGuard::Start& StepGuard::start_of(const b2Body* body) { return starts_[slot_of(id_of(body))]; }
 
 void StepGuard::add_acceleration(Id body, float linear, float angular) {
-  const auto slot = static_cast<std::uint32_t>(body);
+  const std::uint32_t slot = slot_of(body);
   if (slot >= starts_.size()) starts_.resize(slot + 1);
   starts_[slot].acceleration += linear;
   starts_[slot].angular_acceleration += angular;
@@ -103,7 +101,7 @@ void StepGuard::begin(b2World& world, float dt) {
   float mass = 0.0F;
   for (const b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
     if (body->GetType() == b2_kinematicBody) continue;
-    const auto slot = static_cast<std::uint32_t>(id_of(body));
+    const std::uint32_t slot = slot_of(id_of(body));
     if (slot >= starts_.size()) starts_.resize(slot + 1);
     Start& start = starts_[slot];
     if (is_dynamic(body)) {

@@ -64,7 +64,7 @@ void TouchCollectors::begin(const ContactRow& row) {
 }
 
 void TouchCollectors::begin_in(TouchCollector& collector, const ContactRow& row) {
-  if (owned_.count(row.body_a) == 0 || owned_.count(row.body_b) == 0) return;
+  if (!owned_.contains(row.body_a) || !owned_.contains(row.body_b)) return;
   if (row.is_sensor && !collector.counts_sensors) return;
   if (contains(collector.excluded, row.body_a) || contains(collector.excluded, row.body_b)) return;
   const bool is_a = contains(collector.bodies, row.body_a);

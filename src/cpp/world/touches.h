@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <unordered_map>
-#include <unordered_set>
 #include <vector>
 
 #include "world/slot_map.h"
@@ -76,7 +75,7 @@ class TouchCollectors {
 
   SlotMap<TouchCollector, IdKind::kTouches> collectors_;
   std::unordered_map<Id, std::vector<Id>> by_body_;
-  std::unordered_set<Id> owned_;
+  IdSet owned_;
 };
 
 }  // namespace flatland
