@@ -58,7 +58,7 @@ void Crowd::give_way(std::vector<Choice>& choices, std::int64_t step, double dt,
   std::sort(blocked.begin(), blocked.end(),
             [this](std::size_t a, std::size_t b) { return precedes(people_[a], people_[b]); });
   const auto until = step + static_cast<std::int64_t>(std::ceil(kHold / dt));
-  std::vector<bool> is_asked(blocked.empty() ? 0 : people_.size());
+  std::vector<bool> is_asked(people_.size());
   for (const std::size_t i : blocked) {
     if (!is_asked[i]) ask_for_room(i, choices, is_asked, until);
   }

@@ -253,8 +253,8 @@ bool meets(const Move& move, const std::vector<b2Body*>& bodies, const b2BroadPh
 }
 
 // Returns a bound of the distance of the points of a fixture from the center of mass, for its box.
-// The rotation of a circle has no effect on its box, so that only its center counts: 0 means that
-// the rotation of the body has no effect at all.
+// The rotation of a circle has no effect on its box, so that only its center counts: with 0, the
+// rotation of the body has no effect on the box.
 float reach_of(const b2Shape& shape, const b2AABB& box, const b2Sweep& sweep) {
   if (shape.GetType() == b2Shape::e_circle) {
     return static_cast<const b2CircleShape&>(shape).m_p.Length() + sweep.localCenter.Length();
@@ -388,7 +388,7 @@ bool FreeMotion::begin(b2World& world, float dt, int position_iterations, bool m
   bool is_all = true;
   for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
     if (body->GetType() == b2_dynamicBody) dynamic_.push_back(body);
-    if (!is_moving(*body) || (may_coast && coasts(*body))) continue;
+    if (!is_moving(*body) || (may_coast && start_coasting(*body))) continue;
     Move& move = leaving_.emplace_back();
     const bool is_free = plan(*body, broad_phase, dt, position_iterations, move);
     if (is_free && move.are_kept) {
@@ -419,7 +419,7 @@ void FreeMotion::end() {
   for (b2Body* body : moved_) set_awake(*body, true);
 }
 
-bool FreeMotion::coasts(b2Body& body) {
+bool FreeMotion::start_coasting(b2Body& body) {
   if (body.GetType() != b2_kinematicBody) return false;
   const Room room = room_of(body, broad_phase_of(*world_), dt_);
   if (room.steps == 0) return false;

@@ -9,8 +9,8 @@
 // be free then, since its contacts are those with dynamic bodies, which are few compared to walls.
 //
 // A kinematic body that has no contacts and will not leave its boxes for some steps may coast: its
-// state stays as it is, until all these steps are carried out at once. Box2D believes that it
-// sleeps, as all bodies that are moved here.
+// state stays as it is, until all these steps are carried out at once. For Box2D it sleeps,
+// as all bodies that are moved here.
 #pragma once
 
 #include <box2d/b2_body.h>
@@ -69,7 +69,7 @@ class FreeMotion {
   bool begin(b2World& world, float dt, int position_iterations, bool may_coast);
   // Must be called after b2World::Step, or in its place.
   void end();
-  // Carries out the steps of all bodies that coast. Must be called between two steps before anyone
+  // Carries out the steps of all bodies that coast. Must be called between two steps before code
   // reads or changes a kinematic body, and before dt changes.
   void catch_up();
 
@@ -83,7 +83,8 @@ class FreeMotion {
   static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 
   // Makes a body coast from this step on, if this is possible for more than one step.
-  bool coasts(b2Body& body);
+  bool start_coasting(b2Body& body);
+  // Carries out the steps of the coasting bodies that satisfy a condition.
   template <typename Condition>
   void finish(Condition condition);
 

@@ -460,7 +460,7 @@ World::ExclusiveUse::ExclusiveUse(World& world, const char* activity) : world_(&
     world.wait_for_readers();
     users = 0;
   }
-  // Other threads only tell from these that they do not own the use.
+  // The order of these stores has no effect: no other thread can read its own id here.
   world.activity_.store(activity, std::memory_order_relaxed);
   world.owner_.store(std::this_thread::get_id(), std::memory_order_relaxed);
   if (world.closed()) {
