@@ -33,9 +33,7 @@ struct Room {
   bool is_turning = false;  // whether the rotation has an effect on its boxes
 };
 
-bool is_moving(const b2Body& body) {
-  return body.GetType() != b2_staticBody && body.IsAwake() && body.IsEnabled();
-}
+bool is_moving(const b2Body& body) { return body.IsAwake() && body.IsEnabled(); }
 
 // Returns the state after a step without contacts and joints, in the operations of b2Island::Solve.
 // There is no gravity.
@@ -368,10 +366,10 @@ void set_awake(b2Body& body, bool is_awake) {
 
 }  // namespace
 
-bool FreeMotion::begin(b2World& world, float dt, int position_iterations, bool may_coast) {
+bool FreeMotion::begin(b2World& world, const BodiesByType& bodies, float dt,
+                       int position_iterations, bool may_coast) {
   moved_.clear();
   leaving_.clear();
-  dynamic_.clear();
   b2BroadPhase& broad_phase = broad_phase_of(world);
   // The next step searches for new contacts of bodies that were created or moved from outside.
   if (get<members::WorldNewContacts>(world) || !get<members::WorldStepComplete>(world) ||
@@ -386,9 +384,7 @@ bool FreeMotion::begin(b2World& world, float dt, int position_iterations, bool m
   if (pause_ > 0) --pause_;
   may_coast = may_coast && pause_ == 0;
   bool is_all = true;
-  for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
-    if (body->GetType() == b2_dynamicBody) dynamic_.push_back(body);
-    if (!is_moving(*body) || (may_coast && start_coasting(*body))) continue;
+  const auto move_body = [&](b2Body* body) {
     Move& move = leaving_.emplace_back();
     const bool is_free = plan(*body, broad_phase, dt, position_iterations, move);
     if (is_free && move.are_kept) {
@@ -397,11 +393,19 @@ bool FreeMotion::begin(b2World& world, float dt, int position_iterations, bool m
     }
     if (!is_free || move.are_kept) leaving_.pop_back();
     is_all = is_all && is_free;
+  };
+  for (b2Body* body : bodies.dynamic) {
+    if (is_moving(*body)) move_body(body);
+  }
+  if (coasting_.size() < bodies.kinematic.size()) {
+    for (b2Body* body : bodies.kinematic) {
+      if (is_moving(*body) && !(may_coast && start_coasting(*body))) move_body(body);
+    }
   }
   // The broad phase depends on the order in which boxes move. It is that of Box2D if all bodies are
   // free, since those above have moved no box.
   is_all = is_all && std::none_of(leaving_.begin(), leaving_.end(), [&](const Move& move) {
-             return meets(move, dynamic_, broad_phase);
+             return meets(move, bodies.dynamic, broad_phase);
            });
   if (is_all) {
     for (const Move& move : leaving_) carry_out(move, broad_phase);
@@ -420,7 +424,6 @@ void FreeMotion::end() {
 }
 
 bool FreeMotion::start_coasting(b2Body& body) {
-  if (body.GetType() != b2_kinematicBody) return false;
   const Room room = room_of(body, broad_phase_of(*world_), dt_);
   if (room.steps == 0) return false;
   const std::int64_t begin = step_ - 1;

@@ -22,6 +22,8 @@
 #include <limits>
 #include <vector>
 
+#include "world/bodies_by_type.h"
+
 class b2World;
 struct b2FixtureProxy;
 
@@ -66,7 +68,8 @@ class FreeMotion {
   // which then ignores them. Bodies may begin to coast if `may_coast` is set.
   //
   // Returns whether b2World::Step has nothing left to do, and must not be called.
-  bool begin(b2World& world, float dt, int position_iterations, bool may_coast);
+  bool begin(b2World& world, const BodiesByType& bodies, float dt, int position_iterations,
+             bool may_coast);
   // Must be called after b2World::Step, or in its place.
   void end();
   // Carries out the steps of all bodies that coast. Must be called between two steps before code
@@ -90,7 +93,6 @@ class FreeMotion {
 
   std::vector<b2Body*> moved_;
   std::vector<free_motion::Move> leaving_;
-  std::vector<b2Body*> dynamic_;
 
   std::vector<Coasting> coasting_;
   std::int64_t step_ = 0;           // number of steps begun

@@ -85,37 +85,38 @@ bool is_finite(const b2Body* body) {
 
 StepGuard::Start& StepGuard::start_of(const b2Body* body) { return starts_[slot_of(id_of(body))]; }
 
-void StepGuard::add_acceleration(Id body, float linear, float angular) {
+StepGuard::Start& StepGuard::make_start(Id body) {
   const std::uint32_t slot = slot_of(body);
   if (slot >= starts_.size()) starts_.resize(slot + 1);
-  starts_[slot].acceleration += linear;
-  starts_[slot].angular_acceleration += angular;
+  return starts_[slot];
+}
+
+void StepGuard::add_acceleration(Id body, float linear, float angular) {
+  Start& start = make_start(body);
+  start.acceleration += linear;
+  start.angular_acceleration += angular;
   has_accelerations_ = true;
 }
 
-void StepGuard::begin(b2World& world, float dt) {
+void StepGuard::begin(const b2World& world, const BodiesByType& bodies, float dt) {
   world_ = &world;
   ++step_;
   failed_ = false;
   updates_.clear();
   float mass = 0.0F;
-  for (const b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
-    if (body->GetType() == b2_kinematicBody) continue;
-    const std::uint32_t slot = slot_of(id_of(body));
-    if (slot >= starts_.size()) starts_.resize(slot + 1);
-    Start& start = starts_[slot];
-    if (is_dynamic(body)) {
-      if (start.last_jam + 1 != step_) start.jammed_steps = 0;
-      mass += body->GetMass();
-      // This step starts from impulses of the previous step, whose energy is therefore allowed,
-      // too.
-      const double earlier = start.energy;
-      start.energy = energy_of(body, dt * start.acceleration, dt * start.angular_acceleration);
-      start.allowed = std::max(start.energy, earlier);
-    } else {
-      start.position = body->GetPosition();
-      start.angle = body->GetAngle();
-    }
+  for (const b2Body* body : bodies.dynamic) {
+    Start& start = make_start(id_of(body));
+    if (start.last_jam + 1 != step_) start.jammed_steps = 0;
+    mass += body->GetMass();
+    // This step starts from impulses of the previous step, whose energy is therefore allowed, too.
+    const double earlier = start.energy;
+    start.energy = energy_of(body, dt * start.acceleration, dt * start.angular_acceleration);
+    start.allowed = std::max(start.energy, earlier);
+  }
+  for (const b2Body* body : bodies.fixed) {
+    Start& start = make_start(id_of(body));
+    start.position = body->GetPosition();
+    start.angle = body->GetAngle();
   }
   // This impulse accelerates all bodies together to the largest speed of Box2D.
   largest_impulse_ = mass * b2_maxTranslation / dt;
@@ -179,22 +180,23 @@ void StepGuard::limit(b2Body* body) {
   }
 }
 
-StepReport StepGuard::end(b2World& world) {
+StepReport StepGuard::end(const BodiesByType& bodies) {
   StepReport report;
-  for (b2Body* body = world.GetBodyList(); body != nullptr; body = body->GetNext()) {
-    // A kinematic body that sleeps, or coasts within its boxes, remains valid.
-    if (body->GetType() == b2_kinematicBody && !body->IsAwake()) continue;
+  for (b2Body* body : bodies.dynamic) {
     if (!is_finite(body)) {
-      if (body->GetType() == b2_staticBody) {
-        restore_static(body);
-      } else {
-        report.invalid.push_back(id_of(body));
-      }
-    } else if (is_dynamic(body)) {
-      const Start& start = start_of(body);
-      const bool is_faster = energy_of(body) > start.allowed * kGainAlone * kGainAlone;
-      if (is_faster && start.step != step_) examine_group(body);
+      report.invalid.push_back(id_of(body));
+      continue;
     }
+    const Start& start = start_of(body);
+    const bool is_faster = energy_of(body) > start.allowed * kGainAlone * kGainAlone;
+    if (is_faster && start.step != step_) examine_group(body);
+  }
+  for (const b2Body* body : bodies.kinematic) {
+    // A body that sleeps, or coasts within its boxes, remains valid.
+    if (body->IsAwake() && !is_finite(body)) report.invalid.push_back(id_of(body));
+  }
+  for (b2Body* body : bodies.fixed) {
+    if (!is_finite(body)) restore_static(body);
   }
   for (const b2Body* body : limited_) {
     report.limited.push_back(id_of(body));

@@ -15,6 +15,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "world/bodies_by_type.h"
 #include "world/slot_map.h"
 
 class b2Contact;
@@ -39,8 +40,8 @@ class StepGuard {
   void add_acceleration(Id body, float linear, float angular);
 
   // Must be called before and after b2World::Step.
-  void begin(b2World& world, float dt);
-  StepReport end(b2World& world);
+  void begin(const b2World& world, const BodiesByType& bodies, float dt);
+  StepReport end(const BodiesByType& bodies);
 
   // Must be called before each contact is solved, after any other hook.
   void pre_solve(b2Contact* contact) noexcept;
@@ -62,6 +63,8 @@ class StepGuard {
     std::uint64_t jammed_steps = 0;  // number of consecutive such steps up to `last_jam`
   };
 
+  // Returns the state of a body that may be new.
+  Start& make_start(Id body);
   Start& start_of(const b2Body* body);
   // Returns the number of steps for which a body of the contact has been limited.
   std::uint64_t jammed_steps(b2Contact* contact);

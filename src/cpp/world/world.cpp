@@ -101,6 +101,7 @@ StepReport World::step(double dt, int velocity_iterations, int position_iteratio
                        PreSolveHook* hook) {
   check_step(dt, velocity_iterations, position_iterations);
   const auto start = Clock::now();
+  bodies_by_type_.read(*engine_);
   StepReport report = step_unchecked(dt, velocity_iterations, position_iterations, hook, false);
   last_step_time_ = std::chrono::duration<double>(Clock::now() - start).count();
   return report;
@@ -114,12 +115,12 @@ StepReport World::step_unchecked(double dt, int velocity_iterations, int positio
   }
   const auto seconds = static_cast<float>(dt);
   StepGuard& guard = contacts_.guard;
-  guard.begin(*engine_, seconds);
+  guard.begin(*engine_, bodies_by_type_, seconds);
   contacts_.hook = hook;
   contacts_.begin_step();
   // A hook is called within the step, and may read the state of any body.
-  const bool is_done =
-      hook == nullptr && free_motion_.begin(*engine_, seconds, position_iterations, may_coast);
+  const bool is_done = hook == nullptr && free_motion_.begin(*engine_, bodies_by_type_, seconds,
+                                                             position_iterations, may_coast);
   if (!is_done) {
     walls_.create(*engine_, seconds);
     begin_step(*engine_);
@@ -130,7 +131,7 @@ StepReport World::step_unchecked(double dt, int velocity_iterations, int positio
   }
   if (hook == nullptr) free_motion_.end();
   contacts_.hook = nullptr;
-  StepReport report = guard.end(*engine_);
+  StepReport report = guard.end(bodies_by_type_);
   invalid_ = report.invalid;
   if (contacts_.take_failure()) throw std::bad_alloc();
   return report;
@@ -147,6 +148,7 @@ void Run::check() const {
 
 RunResult World::run(const Run& run) {
   run.check();
+  bodies_by_type_.read(*engine_);  // a run creates and destroys no bodies
   struct CatchUp {
     FreeMotion& motion;
     ~CatchUp() { motion.catch_up(); }

@@ -280,6 +280,7 @@ class World final : private b2DestructionListener {
   SlotMap<JointRecord, IdKind::kJoint> joints_;
   ContactRecorder contacts_;
   FreeMotion free_motion_;
+  BodiesByType bodies_by_type_;  // valid within a run
   RayScene rays_{fixtures_};
   JobQueue jobs_;
   Stage stage_ = Stage::kStart;
