@@ -118,13 +118,17 @@ Vec FreeGrid::center(std::size_t index) const {
 }
 
 FlowField::FlowField(const FreeGrid& grid, const Place& place)
-    : low_(grid.low()), cell_(grid.cell()), columns_(grid.columns()), rows_(grid.rows()) {
+    : low_(grid.low()),
+      cell_(grid.cell()),
+      columns_(grid.columns()),
+      rows_(grid.rows()),
+      blocks_per_row_(static_cast<std::size_t>(columns_) / kBlockColumns + 1) {
   Front front(grid);
-  directions_.resize(static_cast<std::size_t>(columns_ * rows_));
+  blocks_.resize(blocks_per_row_ * (static_cast<std::size_t>(rows_) / kBlockRows + 1));
   // The front starts only in cells within `reach` of the place, without its radius: a part of the
   // disc around the place may be on the other side of a wall.
   const double reach = 0.75 * cell_;
-  for (std::size_t i = 0; i < directions_.size(); ++i) {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(columns_ * rows_); ++i) {
     const Vec center = grid.center(i);
     if (grid.slowness(i) > 0.0F && length(place.nearest(center) - center) <= reach) front.start(i);
   }
@@ -137,11 +141,10 @@ FlowField::FlowField(const FreeGrid& grid, const Place& place)
       const Vec slope{upwind(front.time(column - 1, row), here, front.time(column + 1, row)),
                       upwind(front.time(column, row - 1), here, front.time(column, row + 1))};
       // The slope is zero at the place itself.
-      const Vec center = grid.center(index(column, row));
+      const Vec center = grid.center(static_cast<std::size_t>(row * columns_ + column));
       const Vec direction = unit(-slope, unit(place.nearest(center) - center, {1.0, 0.0}));
-      directions_[index(column, row)] = {
-          static_cast<std::int8_t>(std::lround(kUnit * direction.x)),
-          static_cast<std::int8_t>(std::lround(kUnit * direction.y))};
+      at(column, row) = {static_cast<std::int8_t>(std::lround(kUnit * direction.x)),
+                         static_cast<std::int8_t>(std::lround(kUnit * direction.y))};
     }
   }
 }
@@ -150,7 +153,7 @@ void FlowField::prefetch(Vec p) const {
   const std::int64_t column = cell_index((p.x - low_.x) / cell_ - 0.5, columns_);
   const std::int64_t row = cell_index((p.y - low_.y) / cell_ - 0.5, rows_);
   for (const std::int64_t each : {row, std::min(row + 1, rows_ - 1)}) {
-    flatland::prefetch(&directions_[index(column, each)], 2 * sizeof(Direction));
+    flatland::prefetch(&at(column, each), sizeof(Direction));
   }
 }
 
@@ -164,14 +167,14 @@ Vec FlowField::direction(Vec p, const Walls& walls) const {
   }
   const std::int64_t column = floored(x);
   const std::int64_t row = floored(y);
-  const auto at = [&](std::int64_t c, std::int64_t r) {
-    return c < 0 || r < 0 || c >= columns_ || r >= rows_ ? Direction{} : directions_[index(c, r)];
+  const auto stored = [&](std::int64_t c, std::int64_t r) {
+    return c < 0 || r < 0 || c >= columns_ || r >= rows_ ? Direction{} : at(c, r);
   };
   const double u = x - static_cast<double>(column);
   const double v = y - static_cast<double>(row);
   Vec sum;
   for (int i = 0; i < 4; ++i) {
-    const Direction d = at(column + i % 2, row + i / 2);
+    const Direction d = stored(column + i % 2, row + i / 2);
     const double weight = (i % 2 == 1 ? u : 1.0 - u) * (i / 2 == 1 ? v : 1.0 - v);
     sum += weight * Vec{static_cast<double>(d.x), static_cast<double>(d.y)};
   }
@@ -183,7 +186,7 @@ Vec FlowField::direction(Vec p, const Walls& walls) const {
   Vec target;
   for (std::int64_t r = row - kSearch; r <= row + kSearch; ++r) {
     for (std::int64_t c = column - kSearch; c <= column + kSearch; ++c) {
-      const Direction d = at(c, r);
+      const Direction d = stored(c, r);
       if (d.x == 0 && d.y == 0) continue;
       const Vec offset{static_cast<double>(c) - x, static_cast<double>(r) - y};
       if (square(offset) < nearest && walls.is_clear(p, p + cell_ * offset)) {

@@ -1,6 +1,7 @@
 // The ways to a place: the direction of the fastest way from each cell of a grid.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -66,14 +67,34 @@ class FlowField {
     std::int8_t x = 0, y = 0;
   };
 
-  std::size_t index(std::int64_t column, std::int64_t row) const {
-    return static_cast<std::size_t>(row * columns_ + column);
+  // The cells are stored in tiles, each in a line of the cache, and the tiles in blocks, each in a
+  // page of memory. A person walks within a tile for some updates, and within a block for some
+  // seconds.
+  static constexpr std::size_t kTileColumns = 8;
+  static constexpr std::size_t kTileRows = 4;
+  static constexpr std::size_t kBlockColumns = 8 * kTileColumns;
+  static constexpr std::size_t kBlockRows = 8 * kTileRows;
+  using Tile = std::array<Direction, kTileColumns * kTileRows>;
+  struct alignas(4096) Block {
+    std::array<Tile, 64> tiles;
+  };
+
+  Direction& at(std::int64_t column, std::int64_t row) {
+    const auto x = static_cast<std::size_t>(column);
+    const auto y = static_cast<std::size_t>(row);
+    Block& block = blocks_[y / kBlockRows * blocks_per_row_ + x / kBlockColumns];
+    Tile& tile = block.tiles[y % kBlockRows / kTileRows * 8 + x % kBlockColumns / kTileColumns];
+    return tile[y % kTileRows * kTileColumns + x % kTileColumns];
+  }
+  const Direction& at(std::int64_t column, std::int64_t row) const {
+    return const_cast<FlowField*>(this)->at(column, row);
   }
 
   Vec low_;
   double cell_;
   std::int64_t columns_, rows_;
-  std::vector<Direction> directions_;
+  std::size_t blocks_per_row_;
+  std::vector<Block> blocks_;
   std::size_t reached_ = 0;
 };
 
