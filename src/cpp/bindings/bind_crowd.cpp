@@ -423,6 +423,13 @@ void bind_formulas(py::module_& module) {
       },
       py::arg("segments"), py::arg("place"), py::arg("low"), py::arg("high"));
   module.def(
+      "crowd_is_in_view",
+      [to_walls](const PySegments& segments, const PyPoint& place, const PyPoint& low,
+                 const PyPoint& high) {
+        return to_walls(segments, 0.0).is_in_view(to_vec(place), to_vec(low), to_vec(high));
+      },
+      py::arg("segments"), py::arg("place"), py::arg("low"), py::arg("high"));
+  module.def(
       "crowd_doors",
       [to_walls](const PySegments& segments, const std::vector<PyPoint>& places) {
         constexpr double kClearance = 0.22;
@@ -434,12 +441,14 @@ void bind_formulas(py::module_& module) {
             walls);
         std::vector<PyPair> centers;
         for (const crowd::Gate& gate : ways.gates()) centers.push_back(to_pair(gate.center));
-        std::vector<std::vector<std::uint32_t>> near;
+        std::vector<std::vector<std::uint32_t>> in_view, others;
         for (const PyPoint& place : places) {
-          const crowd::SegmentGrid::Indices indices = ways.gates_near(to_vec(place));
-          near.emplace_back(indices.begin(), indices.end());
+          const crowd::SegmentGrid::Indices seen = ways.gates_in_view(to_vec(place));
+          const crowd::SegmentGrid::Indices further = ways.other_gates(to_vec(place));
+          in_view.emplace_back(seen.begin(), seen.end());
+          others.emplace_back(further.begin(), further.end());
         }
-        return std::pair{centers, near};
+        return std::tuple{centers, in_view, others};
       },
       py::arg("segments"), py::arg("places"));
   module.def("step_length", &crowd::step_length, py::arg("speed"));

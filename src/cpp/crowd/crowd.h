@@ -136,7 +136,7 @@ class Crowd {
   Signal signal_of(std::uint32_t gate) const;
   void update_signals(std::int64_t step, double dt);
   Choice step_aside(const Person& person, const Choice& choice, const Approach& approach) const;
-  bool comes_towards(const Person& person, Vec way, std::size_t j, const Choice& choice,
+  bool comes_towards(std::size_t i, Vec way, std::size_t j, const Choice& choice,
                      double& ahead) const;
   void keep_right(std::vector<Choice>& choices) const;
 
@@ -149,6 +149,8 @@ class Crowd {
 
   // motion.cpp: how a person moves.
   void find_neighbours();
+  // Returns whether no wall is between two people.
+  bool see_each_other(std::size_t i, std::size_t j) const;
   // Computes the repulsions of the neighbours a and b by each other; their places in the list of
   // the other one's neighbours are given.
   void find_pushes(std::uint32_t a, std::uint32_t place_of_b, std::uint32_t b,
@@ -189,7 +191,7 @@ class Crowd {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;  // people who see each other
   std::vector<std::uint32_t> neighbours_, neighbour_starts_;
   std::vector<std::uint32_t> next_;   // the next place of each person in `neighbours_`
-  std::vector<Vec> pushes_;           // repulsion by each of `neighbours_`
+  std::vector<Vec> pushes_;           // repulsion by each of `neighbours_`, zero behind walls
   std::vector<std::uint32_t> gates_;  // that a person may approach
   std::vector<Approach> approaching_;
   std::vector<Choice> choices_;
@@ -199,6 +201,7 @@ class Crowd {
   std::size_t decided_ = 0;            // number of people whose velocity of the motion is chosen
   std::vector<NearPoint> near_walls_;  // within reach of each person
   std::vector<std::uint32_t> near_wall_starts_;
+  std::vector<double> clearances_;  // radius of a disc without walls around each person
   std::vector<NearPoint> near_;
   std::vector<HalfPlane> planes_;
 };

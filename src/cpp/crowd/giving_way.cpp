@@ -104,7 +104,7 @@ void Crowd::ask_for_room(std::size_t root, const std::vector<Choice>& choices,
       const double reach = person.radius + other.radius;
       if (dot(offset, way) <= 0.0 || std::fabs(cross(way, offset)) > reach + kMargin) continue;
       if (length(offset) > reach + kReach) continue;
-      if (!surroundings_.walls().is_clear(person.position, other.position)) continue;
+      if (!see_each_other(i, j)) continue;
       is_asked[j] = true;
       asking.push_back(j);
       const double cosine = dot(choices[j].direction, way_to(target, other.position));

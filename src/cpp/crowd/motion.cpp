@@ -79,18 +79,30 @@ void Crowd::find_neighbours() {
   }
 }
 
+bool Crowd::see_each_other(std::size_t i, std::size_t j) const {
+  const Vec offset = people_[j].position - people_[i].position;
+  const double clearance = clearances_[i] + clearances_[j];
+  // If the discs without walls overlap, they contain the line between their centers.
+  return square(offset) < clearance * clearance ||
+         surroundings_.walls().is_clear(people_[i].position, people_[j].position);
+}
+
 void Crowd::find_pushes(std::uint32_t a, std::uint32_t place_of_b, std::uint32_t b,
                         std::uint32_t place_of_a) {
   const SocialForces& forces = settings_.forces;
   const Person& one = people_[a];
   const Person& other = people_[b];
   const Vec offset = one.position - other.position;
-  pushes_[place_of_b] = repulsion(forces, offset, other.velocity - forces.relative * one.velocity);
+  Vec push = repulsion(forces, offset, other.velocity - forces.relative * one.velocity);
   // Opposite arguments have opposite results, except at the same place.
   const bool is_opposite = forces.relative == 1.0 && square(offset) > 1e-18;
-  pushes_[place_of_a] =
-      is_opposite ? -pushes_[place_of_b]
-                  : repulsion(forces, -offset, one.velocity - forces.relative * other.velocity);
+  Vec opposite = is_opposite
+                     ? -push
+                     : repulsion(forces, -offset, one.velocity - forces.relative * other.velocity);
+  const bool is_negligible = std::max(square(push), square(opposite)) < kNegligible * kNegligible;
+  if (is_negligible || !see_each_other(a, b)) push = opposite = {};
+  pushes_[place_of_b] = push;
+  pushes_[place_of_a] = opposite;
 }
 
 double Crowd::wall_sight(const Person& person) const {
@@ -105,11 +117,17 @@ double Crowd::wall_range(const Person& person, double period) const {
 void Crowd::find_walls(double period) {
   near_walls_.clear();
   near_wall_starts_.clear();
+  clearances_.clear();
   for (const Person& person : people_) {
-    near_wall_starts_.push_back(static_cast<std::uint32_t>(near_walls_.size()));
-    const double range = wall_range(person, period);
-    surroundings_.extend(range);
-    surroundings_.walls().find_near(person.position, range, near_walls_);
+    const std::size_t first = near_walls_.size();
+    near_wall_starts_.push_back(static_cast<std::uint32_t>(first));
+    double clearance = wall_range(person, period);
+    surroundings_.extend(clearance);
+    surroundings_.walls().find_near(person.position, clearance, near_walls_);
+    for (std::size_t i = first; i < near_walls_.size(); ++i) {
+      clearance = std::min(clearance, near_walls_[i].distance);
+    }
+    clearances_.push_back(clearance);
   }
   near_wall_starts_.push_back(static_cast<std::uint32_t>(near_walls_.size()));
 }
@@ -123,7 +141,6 @@ void Crowd::add_walls(std::size_t i, double range, std::vector<NearPoint>& found
 Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, double period) {
   const Person& person = people_[i];
   const SocialForces& forces = settings_.forces;
-  const Walls& walls = surroundings_.walls();
   Vec sum = driving_acceleration(forces, preferred, person.velocity);
   for (std::uint32_t k = neighbour_starts_[i]; k < neighbour_starts_[i + 1]; ++k) {
     const Person& other = people_[neighbours_[k]];
@@ -136,7 +153,6 @@ Vec Crowd::by_social_force(std::size_t i, const Choice& choice, Vec preferred, d
     if (other.yields_to == person.number && person.delay > 0.0) continue;
     const Vec push = pushes_[k];
     if (square(push) < kNegligible * kNegligible) continue;
-    if (!walls.is_clear(person.position, other.position)) continue;
     sum += view_weight(forces, choice.direction, push) * push;
   }
   for (const Obstacle& obstacle : surroundings_.obstacles()) {
@@ -193,7 +209,7 @@ Vec Crowd::by_orca(std::size_t i, Vec preferred, double period) {
   const Disc disc{person.position, person.velocity, person.radius + 0.5 * kMargin};
   for (std::uint32_t k = neighbour_starts_[i]; k < neighbour_starts_[i + 1]; ++k) {
     const Person& other = people_[neighbours_[k]];
-    if (!surroundings_.walls().is_clear(person.position, other.position)) continue;
+    if (!see_each_other(i, neighbours_[k])) continue;
     planes_.push_back(avoid(disc, {other.position, other.velocity, other.radius + 0.5 * kMargin},
                             settings_.horizon, 0.5, period));
   }
@@ -257,8 +273,8 @@ void Crowd::update(World& world, std::int64_t step, double dt) {
     const Way* way = way_to_[target_of(person)].get();
     if (way != nullptr) way->field().prefetch(person.position);
   }
-  find_neighbours();
   find_walls(period);
+  find_neighbours();
   count_guests();
   choices_.resize(people_.size());
   for (std::size_t i = 0; i < people_.size(); ++i) {

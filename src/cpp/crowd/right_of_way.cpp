@@ -30,7 +30,6 @@ void Crowd::find_approaches(std::size_t i, const Choice& choice) {
   const Person& person = people_[i];
   const Way& way = *way_of(target_of(person));
   const std::vector<Gate>& gates = ways_->gates();
-  const SegmentGrid::Indices near = ways_->gates_near(person.position);
   const auto is_ahead = [&](const Gate& gate, int direction, Vec offset, double distance2) {
     // The direction of the passage, 1 or -1. A comparison of it would be a branch.
     const double sign = 2.0 * direction - 1.0;
@@ -39,28 +38,35 @@ void Crowd::find_approaches(std::size_t i, const Choice& choice) {
            (ahead * std::fabs(ahead) > kAhead * kAhead * distance2);
   };
   // Without branches, as in Walls::find_near: the next door replaces one that is not approached.
-  gates_.resize(near.size());
-  std::uint32_t* end = gates_.data();
-  for (const std::uint32_t k : near) {
-    const Gate& gate = gates[k];
-    const int direction = way.through(k);
-    const Vec offset = person.position - gate.center;
-    const double distance2 = square(offset);
-    const bool is_near = distance2 <= kGateReach * kGateReach;
-    const bool is_passed = direction != Way::kNoPassage;
-    const bool may_be_inside = distance2 < gate.radius2;
-    *end = k;
-    end += static_cast<std::ptrdiff_t>(
-        is_passed & is_near & (is_ahead(gate, direction, offset, distance2) | may_be_inside));
-  }
+  const auto select = [&](SegmentGrid::Indices near, std::uint32_t* end) {
+    for (const std::uint32_t k : near) {
+      const Gate& gate = gates[k];
+      const int direction = way.through(k);
+      const Vec offset = person.position - gate.center;
+      const double distance2 = square(offset);
+      const bool is_near = distance2 <= kGateReach * kGateReach;
+      const bool is_passed = direction != Way::kNoPassage;
+      const bool may_be_inside = distance2 < gate.radius2;
+      *end = k;
+      end += static_cast<std::ptrdiff_t>(
+          is_passed & is_near & (is_ahead(gate, direction, offset, distance2) | may_be_inside));
+    }
+    return end;
+  };
+  const SegmentGrid::Indices in_view = ways_->gates_in_view(person.position);
+  const SegmentGrid::Indices others = ways_->other_gates(person.position);
+  gates_.resize(in_view.size() + others.size());
+  std::uint32_t* const end_in_view = select(in_view, gates_.data());
+  std::uint32_t* const end = select(others, end_in_view);
   for (const std::uint32_t* k = gates_.data(); k != end; ++k) {
     const Gate& gate = gates[*k];
     const int direction = way.through(*k);
     const Vec offset = person.position - gate.center;
     const double distance2 = square(offset);
     const bool is_inside = gate.contains(offset);
-    if (is_inside || (is_ahead(gate, direction, offset, distance2) &&
-                      surroundings_.walls().is_clear(person.position, gate.center))) {
+    if (is_inside ||
+        (is_ahead(gate, direction, offset, distance2) &&
+         (k < end_in_view || surroundings_.walls().is_clear(person.position, gate.center)))) {
       approaching_.push_back({i, *k, direction, is_inside, std::sqrt(distance2)});
     }
   }
@@ -129,16 +135,16 @@ void Crowd::keep_doors_clear(std::vector<Choice>& choices, std::int64_t step, do
   }
 }
 
-bool Crowd::comes_towards(const Person& person, Vec way, std::size_t j, const Choice& choice,
+bool Crowd::comes_towards(std::size_t i, Vec way, std::size_t j, const Choice& choice,
                           double& ahead) const {
+  const Person& person = people_[i];
   if (dot(choice.direction, way) > kOpposed || square(choice.velocity) == 0.0) return false;
   // People with the same target can walk in opposite directions only at its door.
   if (target_of(people_[j]) == target_of(person)) return false;
   const Vec offset = people_[j].position - person.position;
   ahead = dot(offset, way);
   const double left = cross(way, offset);
-  return ahead > 0.0 && ahead < kView && left < kLeft && left > -kRight &&
-         surroundings_.walls().is_clear(person.position, people_[j].position);
+  return ahead > 0.0 && ahead < kView && left < kLeft && left > -kRight && see_each_other(i, j);
 }
 
 void Crowd::keep_right(std::vector<Choice>& choices) const {
@@ -149,7 +155,7 @@ void Crowd::keep_right(std::vector<Choice>& choices) const {
     for (std::uint32_t k = neighbour_starts_[i]; k < neighbour_starts_[i + 1]; ++k) {
       const std::size_t j = neighbours_[k];
       double ahead = kView;
-      if (comes_towards(people_[i], way, j, choices[j], ahead)) nearest = std::min(nearest, ahead);
+      if (comes_towards(i, way, j, choices[j], ahead)) nearest = std::min(nearest, ahead);
     }
     if (nearest == kView) continue;
     const double turn = kMostTurn * std::sqrt(1.0 - nearest / kView);

@@ -1,6 +1,7 @@
 #include "crowd/walls.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
@@ -99,6 +100,51 @@ bool Walls::is_hidden(Vec p, Vec low, Vec high) const {
     return crosses(segment, low, p) && crosses(segment, high, p) &&
            crosses(segment, {low.x, high.y}, p) && crosses(segment, {high.x, low.y}, p);
   });
+}
+
+bool Walls::is_in_view(Vec p, Vec low, Vec high) const {
+  if (!is_clear(p, 0.5 * (low + high))) return false;  // quickly, in most cases
+  constexpr double kRounding = 1e-6;                   // m
+  // A segment and the hull are apart if their projections onto a normal of a side of either are.
+  // The sides of the hull are among those of the rectangle and the lines from the point to the
+  // corners.
+  const std::array<Vec, 5> points{p, low, {high.x, low.y}, high, {low.x, high.y}};
+  struct Projection {
+    Vec normal;
+    double least, most;
+  };
+  const auto project = [&](Vec normal) {
+    Projection onto{normal, dot(normal, p), dot(normal, p)};
+    for (const Vec point : points) {
+      onto.least = std::min(onto.least, dot(normal, point) - kRounding);
+      onto.most = std::max(onto.most, dot(normal, point) + kRounding);
+    }
+    return onto;
+  };
+  const Projection onto_x = project({1.0, 0.0});
+  const Projection onto_y = project({0.0, 1.0});
+  std::array<Projection, 6> hull{onto_x, onto_y};
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    hull[i + 1] = project(left_of(unit(points[i] - p)));
+  }
+  const auto touches_hull = [&](const Segment& s) {
+    const auto is_apart = [&](const Projection& onto) {
+      const double a = dot(onto.normal, s.a);
+      const double b = dot(onto.normal, s.b);
+      return std::max(a, b) < onto.least || std::min(a, b) > onto.most;
+    };
+    return std::none_of(hull.begin(), hull.end(), is_apart) &&
+           !is_apart(project(left_of(unit(s.b - s.a))));
+  };
+  const std::int64_t first_column = crossed_.column_of(onto_x.least);
+  const std::int64_t last_column = crossed_.column_of(onto_x.most);
+  const std::int64_t last_row = crossed_.row_of(onto_y.most);
+  for (std::int64_t row = crossed_.row_of(onto_y.least); row <= last_row; ++row) {
+    const SegmentGrid::Indices near = crossed_.in_row(row, first_column, last_column);
+    const auto touches = [&](std::uint32_t i) { return touches_hull(segments_[i]); };
+    if (std::any_of(near.begin(), near.end(), touches)) return false;
+  }
+  return true;
 }
 
 void keep_sides(Vec p, std::vector<NearPoint>& points) {

@@ -33,6 +33,9 @@ class Walls {
   bool is_clear(Vec from, Vec to) const;
   // Returns whether one segment alone hides a point from all points of a rectangle.
   bool is_hidden(Vec p, Vec low, Vec high) const;
+  // Returns whether a point is visible from all points of a rectangle: no segment touches the hull
+  // of both.
+  bool is_in_view(Vec p, Vec low, Vec high) const;
 
  private:
   // Returns whether test(segment) is true for any segment in the cells along a line, to which all

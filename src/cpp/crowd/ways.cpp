@@ -9,14 +9,17 @@
 namespace flatland::crowd {
 namespace {
 
-SegmentGrid grid_of(const std::vector<Gate>& gates, const Walls& walls) {
-  constexpr double kCell = 1.0;  // m
+// Returns the lists of gates that are visible from whole cells, or those of the other gates.
+SegmentGrid grid_of(const std::vector<Gate>& gates, const Walls& walls, bool are_in_view) {
+  constexpr double kCell = 0.5;  // m
   std::vector<Segment> centers;
   std::transform(gates.begin(), gates.end(), std::back_inserter(centers), [](const Gate& gate) {
     return Segment{gate.center, gate.center};
   });
   const auto is_listed = [&](std::uint32_t i, Vec low, Vec high) {
     const Gate& gate = gates[i];
+    const bool is_in_view = walls.is_in_view(gate.center, low, high);
+    if (is_in_view || are_in_view) return is_in_view == are_in_view;
     const Vec center = 0.5 * (low + high);
     const double reach = std::sqrt(gate.radius2) + length(high - center);
     return length(gate.center - center) <= reach || !walls.is_hidden(gate.center, low, high);
@@ -50,7 +53,8 @@ Ways::Ways(FreeGrid grid, std::shared_ptr<const Walls> walls)
     : grid_(std::move(grid)),
       walls_(std::move(walls)),
       gates_(find_gates(grid_, *walls_)),
-      gate_grid_(grid_of(gates_, *walls_)) {}
+      gates_in_view_(grid_of(gates_, *walls_, true)),
+      other_gates_(grid_of(gates_, *walls_, false)) {}
 
 std::shared_ptr<const Way> Ways::to(const Place& place) {
   Entry* entry = nullptr;

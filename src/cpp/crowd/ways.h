@@ -48,8 +48,10 @@ class Ways {
   const FreeGrid& grid() const { return grid_; }
   const std::vector<Gate>& gates() const { return gates_; }
   // Returns the indices of all gates within a distance of `kGateReach` of a point that are visible
-  // or contain the point, in ascending order, and of few others.
-  SegmentGrid::Indices gates_near(Vec p) const { return gate_grid_.near(p); }
+  // from everywhere near it, in ascending order, and of few others.
+  SegmentGrid::Indices gates_in_view(Vec p) const { return gates_in_view_.near(p); }
+  // Returns the same for all further gates that are visible or contain the point.
+  SegmentGrid::Indices other_gates(Vec p) const { return other_gates_.near(p); }
   std::shared_ptr<const Way> to(const Place& place);
   // Returns a way that is not kept.
   std::shared_ptr<const Way> to_temporary(const Place& place) const;
@@ -65,7 +67,7 @@ class Ways {
   const FreeGrid grid_;
   const std::shared_ptr<const Walls> walls_;
   const std::vector<Gate> gates_;
-  const SegmentGrid gate_grid_;
+  const SegmentGrid gates_in_view_, other_gates_;
   std::mutex mutex_;
   std::map<Key, Entry> entries_;  // by the numbers of the place
 };

@@ -13,6 +13,7 @@ from flatland._core import (
     crowd_doors,
     crowd_is_clear,
     crowd_is_hidden,
+    crowd_is_in_view,
     crowd_near_walls,
     crowd_repulsion,
     crowd_wall_repulsion,
@@ -119,38 +120,69 @@ def test_a_line_is_clear_if_no_wall_crosses_it(seed: int) -> None:
         assert crowd_is_clear(segments, a, b) == (not is_crossed)
 
 
-def test_a_place_is_hidden_only_from_rectangles_without_a_clear_line_to_it() -> None:
-    hidden = 0
+@pytest.mark.parametrize("is_known", [crowd_is_hidden, crowd_is_in_view])
+def test_lines_from_rectangles_are_clear_as_their_views_say(is_known: Any) -> None:
+    known = 0
     for seed in range(400):
         rng = np.random.default_rng(seed)
         segments = random_segments(rng)
         place, low = rng.uniform(0.0, 8.0, (2, 2))
         high = low + rng.uniform(0.0, 1.0, 2)
-        if not crowd_is_hidden(segments, place.tolist(), low.tolist(), high.tolist()):
+        if not is_known(segments, place.tolist(), low.tolist(), high.tolist()):
             continue
-        hidden += 1
+        known += 1
         for point in (low + rng.uniform(0.0, 1.0, (50, 2)) * (high - low)).tolist():
-            assert not crowd_is_clear(segments, point, place.tolist())
-    assert hidden > 30
+            is_clear = crowd_is_clear(segments, point, place.tolist())
+            assert is_clear == (is_known is crowd_is_in_view)
+    assert known > 30
+
+
+def test_a_wall_hides_a_place_if_it_covers_all_lines_to_it() -> None:
     wall: Segments = [((1.0, -3.0), (1.0, 3.0))]
     assert crowd_is_hidden(wall, (0.0, 0.0), (2.0, -1.0), (3.0, 1.0))
     assert not crowd_is_hidden(wall, (0.0, 0.0), (2.0, -1.0), (3.0, 9.5))  # not from a corner
 
 
+@pytest.mark.parametrize(
+    ("wall", "is_in_view"),
+    [
+        (((1.0, 0.52), (1.0, 3.0)), True),  # beside the line to a corner
+        (((1.0, 0.48), (1.0, 3.0)), False),
+        (((0.0, 1.1), (4.0, 1.1)), True),  # beyond a side
+        (((2.4, -0.2), (2.6, 0.2)), False),  # inside of the rectangle
+        (((2.5, 1.6), (3.6, 0.5)), True),  # in the bounding box of a corner, but not at the corner
+        (((2.5, 1.4), (3.4, 0.5)), False),
+        (((-0.5, -1.0), (-0.5, 1.0)), True),  # behind the place
+        (((-1.0, 0.0), (0.0, 0.0)), False),  # up to the place
+        (((1.0, 0.0), (1.0, 0.0)), False),  # a point
+    ],
+)
+def test_a_place_is_in_view_if_no_wall_is_in_the_hull(wall: Any, is_in_view: bool) -> None:
+    # The hull of (0, 0) and of the rectangle: its upper side passes (1, 0.5) and (2, 1).
+    far = ((50.0, 50.0), (51.0, 50.0))
+    assert crowd_is_in_view([far, wall], (0.0, 0.0), (2.0, -1.0), (3.0, 1.0)) == is_in_view
+
+
 def test_the_doors_near_a_place_contain_all_that_are_visible() -> None:
-    visible = 0
+    visible = in_view = 0
     for seed in range(60):
         rng = np.random.default_rng(seed)
         segments = random_segments(rng)
         places = rng.uniform(-4.0, 12.0, (200, 2))
-        doors, near = crowd_doors(segments, places.tolist())
-        for place, indices in zip(places, near, strict=True):
-            assert indices == sorted(set(indices))
+        doors, *lists = crowd_doors(segments, places.tolist())
+        for place, seen, further in zip(places, *lists, strict=True):
+            assert seen == sorted(set(seen))
+            assert further == sorted(set(further) - set(seen))
             for index, door in enumerate(doors):
-                if np.hypot(*(place - door)) <= 4.0 and crowd_is_clear(segments, place, door):
-                    assert index in indices
-                    visible += 1
+                if np.hypot(*(place - door)) > 4.0:
+                    continue
+                is_visible = crowd_is_clear(segments, place, door)
+                assert is_visible or index not in seen
+                assert not is_visible or index in seen + further
+                visible += is_visible
+                in_view += index in seen
     assert visible > 1000
+    assert in_view > visible / 4
 
 
 def test_two_discs_share_the_change_of_velocity_that_avoids_a_head_on_collision() -> None:

@@ -207,15 +207,15 @@ def test_those_who_wander_turn_away_from_a_closed_door(files: WorldFiles, model:
     assert walked.min() > 3.0  # between the places on this side, although half are on the other one
 
 
-def load_lines(files: WorldFiles, lines: str, group: str) -> World:
-    """Loads a world with walls of line segments and a group of people."""
+def load_lines(files: WorldFiles, lines: str, groups: str, options: str = "") -> World:
+    """Loads a world with walls of line segments and people."""
     files.write("walls.lines", lines)
     files.write(
         "walls.yaml", "{type: line_segments, data: walls.lines, scale: 1, origin: [0, 0, 0]}\n"
     )
     return files.load(
         "properties: {}\nlayers: [{name: 2d, map: walls.yaml}]\n"
-        f"plugins: [{{name: people, type: Pedestrians, groups: [{{name: a, {group}}}]}}]\n"
+        f"plugins: [{{name: people, type: Pedestrians, {options}groups: {groups}}}]\n"
     )
 
 
@@ -223,15 +223,52 @@ def test_those_who_wander_need_two_places_with_a_way_between_them(files: WorldFi
     # Each of 100 rooms has space for one person, so that the places are in different ones.
     lines = "".join(f"{i} 0 {i} 10\n0 {i} 10 {i}\n" for i in range(11))
     with pytest.raises(PluginError, match="there are no two free places with a way between them"):
-        load_lines(files, lines, "count: 1, places: 2, radius: 0.4")
+        load_lines(files, lines, "[{name: a, count: 1, places: 2, radius: 0.4}]")
 
 
 def test_nobody_is_added_inside_of_furniture(files: WorldFiles) -> None:
     lines = "0 0 9 0\n9 0 9 6\n9 6 0 6\n0 6 0 0\n" + SHELF
-    group = "count: 0, area: [3, 1, 3.5, 5], waypoints: [{at: [8, 3]}]"
-    world = load_lines(files, lines, group)
+    groups = "[{name: a, count: 0, area: [3, 1, 3.5, 5], waypoints: [{at: [8, 3]}]}]"
+    world = load_lines(files, lines, groups)
     with pytest.raises(WorldError, match="found only 0 of 1 free places with a way"):
         people_of(world).spawn("a", 1)
+
+
+@pytest.mark.parametrize("model", ["social_force", "orca"])
+@pytest.mark.parametrize(
+    ("width", "start", "goal"), [(1.4, 9.0, 1.0), (0.49, 6.55, 6.55)], ids=["oncoming", "standing"]
+)
+def test_people_do_not_react_to_those_behind_a_wall(
+    files: WorldFiles, model: str, width: float, start: float, goal: float
+) -> None:
+    top, a, b = 2.0 * width, 1.5 * width, 0.5 * width
+    lanes = f"0 0 12 0\n12 0 12 {top}\n12 {top} 0 {top}\n0 {top} 0 0\n0 {width} 12 {width}\n"
+    person = "count: 0, radius: 0.2, speed: 1.2, speed_deviation: 0"
+    groups = (
+        f"[{{name: a, {person}, waypoints: [{{at: [11, {a}]}}]}},"
+        f" {{name: b, {person}, waypoints: [{{at: [{goal}, {b}]}}]}}]"
+    )
+    files.write(
+        "obstacle.model.yaml",
+        "bodies: [{name: o, type: kinematic, footprints: [{type: circle, density: 0, radius: 0.2}]}]\n",
+    )
+    starts = {"a": (3.0, a, 0.0), "b": (start, b, math.pi)}
+    tracks = {}
+    for present in ("a", "b", "ab"):
+        world = load_lines(files, lanes, groups, f"{CALM}model: {model}, robot_awareness: 0, ")
+        world.spawn_model("obstacle.model.yaml", "obstacle", pose=(6.8, a, 0.0))
+        people = people_of(world)
+        for name in present:
+            people.spawn(name, poses=[starts[name]])
+        track = []
+        for _ in range(100):
+            world.step(20)
+            track.append(people.people.poses[:, :2])
+        tracks[present] = np.array(track)
+    assert tracks["ab"][:, 0].tolist() == tracks["a"][:, 0].tolist()
+    assert tracks["ab"][:, 1].tolist() == tracks["b"][:, 0].tolist()
+    # They come so close that they would react without the wall.
+    assert np.hypot(*(tracks["ab"][:, 0] - tracks["ab"][:, 1]).T).min() < 1.1 * width
 
 
 def test_a_place_holds_more_people_than_fit_within_its_radius(files: WorldFiles) -> None:
