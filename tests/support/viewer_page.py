@@ -66,7 +66,8 @@ class ViewerPage:
             " && Object.keys(models).sort().join() === Object.keys(expected).sort().join()"
             " && Object.entries(expected).every(([name, pose]) =>"
             "   models[name].pose?.every((value, i) => Math.abs(value - pose[i]) < 1e-3)))"
-            "(arguments[0], flatland.state.worlds[0])",
+            # Until the first message of a new connection, there is no world.
+            "(arguments[0], flatland.state.worlds[0] ?? {paused: null})",
             poses,
             paused,
         )
