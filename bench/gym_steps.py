@@ -7,9 +7,11 @@ AsyncVectorEnv of Gymnasium.
 from __future__ import annotations
 
 import functools
+import itertools
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,7 @@ import gymnasium
 import numpy as np
 from curves import Curve, Panel, plot
 from table import Row
-from timing import Mean, best_of, mean_of
+from timing import Mean, best_of, mean_of, means_of
 
 import flatland.gym
 from flatland.gym import Arrived
@@ -43,24 +45,23 @@ print(int(re.search(r"VmHWM:\\s+(\\d+) kB", open("/proc/self/status").read())[1]
 def rows(unit: float) -> list[Row]:
     """Measures steps of one and of many environments with resets, and the memory of 256."""
     found = []
-    seconds: dict[tuple[str, int], float] = {}
     for env, count, bar in (
         (NAME, 1, 0.05),
-        (NAME, 16, None),
         (NAME, 64, 0.008),
         (NAME, 1024, 0.008),
         ("flatland/Maze-v0", 64, None),
-        ("flatland/Crowd-v0", 16, None),
     ):
-        step = _step(flatland.gym.make_vec(env, count))
-        name = f"{env}, {count} environments in a vector, step of one of them"
-        note = f"{step.rate}, on {os.cpu_count()} cores"
-        found.append(Row(name, step.seconds / unit, "U", bar, note=note))
-        seconds[env, count] = step.seconds
-    ratio = seconds["flatland/Crowd-v0", 16] / seconds[NAME, 16]
-    found.append(Row(f"flatland/Crowd-v0 against {NAME}, 16 environments", ratio, "times", 3.0))
+        (step,) = _steps(flatland.gym.make_vec(env, count))
+        found.append(_row(env, count, step, unit, bar))
+    crowd = "flatland/Crowd-v0"
+    empty, crowded = _steps(*[flatland.gym.make_vec(env, 16) for env in (NAME, crowd)])
+    found += [_row(NAME, 16, empty, unit), _row(crowd, 16, crowded, unit)]
+    ratio = crowded.seconds / empty.seconds
+    found.append(Row(f"{crowd} against {NAME}, 16 environments", ratio, "times", 3.0))
     # Robots do not wait for others: their episodes end at goals only.
-    fleet = _step(flatland.gym.make_vec("flatland/Fleet-v0", 16, num_robots=4, ending=Arrived()))
+    (fleet,) = _steps(
+        flatland.gym.make_vec("flatland/Fleet-v0", 16, num_robots=4, ending=Arrived())
+    )
     name = "flatland/Fleet-v0, 16 worlds with 4 robots in a vector, step of one robot"
     note = f"{fleet.rate}, on {os.cpu_count()} cores"
     found.append(Row(name, fleet.seconds / unit, "U", note=note))
@@ -101,26 +102,42 @@ def _actions(n: int) -> Any:
     return np.random.default_rng(0).uniform(-1, 1, (200, n, 2)).astype(np.float32)
 
 
-def _step(envs: Any) -> Mean:
-    """Returns the time of a step of one of many environments, with all resets [s]."""
+def _stepper(envs: Any) -> Callable[[], object]:
+    """Returns a function that steps a vector with random actions."""
     envs.reset(seed=0)
     actions = _actions(envs.num_envs)
     # The first episodes begin at the same time.
     for action in actions[:100]:
         envs.step(action)
-    numbers = iter(range(10**9))
-    mean = mean_of(lambda: envs.step(actions[next(numbers) % len(actions)]), 4.0)
-    envs.close()
-    return mean / envs.num_envs
+    rest = itertools.cycle(actions)
+    return lambda: envs.step(next(rest))
+
+
+def _steps(*vectors: Any) -> list[Mean]:
+    """Returns the times of a step of one of many environments, with all resets [s].
+
+    The vectors take turns, and are closed.
+    """
+    means = means_of([_stepper(envs) for envs in vectors], 4.0)
+    for envs in vectors:
+        envs.close()
+    return [mean / envs.num_envs for envs, mean in zip(vectors, means, strict=True)]
+
+
+def _row(env: str, count: int, step: Mean, unit: float, bar: float | None = None) -> Row:
+    """Returns the row of the steps of some environments in a vector."""
+    name = f"{env}, {count} environments in a vector, step of one of them"
+    note = f"{step.rate}, on {os.cpu_count()} cores"
+    return Row(name, step.seconds / unit, "U", bar, note=note)
 
 
 def panel() -> Panel:
     """Measures the speed over the number of environments."""
-    ours = [1 / _step(flatland.gym.make_vec(NAME, n)).seconds for n in COUNTS]
+    ours = [1 / _steps(flatland.gym.make_vec(NAME, n))[0].seconds for n in COUNTS]
     theirs = []
     for n in ASYNC_COUNTS:
         make = functools.partial(gymnasium.make, NAME)
-        theirs.append(1 / _step(gymnasium.vector.AsyncVectorEnv([make] * n)).seconds)
+        theirs.append(1 / _steps(gymnasium.vector.AsyncVectorEnv([make] * n))[0].seconds)
     curves = [
         Curve("flatland.gym.make_vec", list(map(float, COUNTS)), ours),
         Curve("AsyncVectorEnv", list(map(float, ASYNC_COUNTS)), theirs),

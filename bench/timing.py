@@ -38,26 +38,39 @@ class Mean:
 
 
 def mean_of(action: Callable[[], object], seconds: float = 2.0, parts: int = 10) -> Mean:
-    """Returns the mean execution time of an action, for throughputs.
+    """Returns the mean execution time of an action, for throughputs; see `means_of`."""
+    return means_of([action], seconds, parts)[0]
+
+
+def means_of(
+    actions: Sequence[Callable[[], object]], seconds: float = 2.0, parts: int = 10
+) -> list[Mean]:
+    """Returns the mean execution times of actions, for throughputs and their ratios.
 
     Each call counts, so that the work must contain everything that belongs to it, such as resets
-    and garbage collection.
+    and garbage collection. The actions take turns, so that all are measured under the same load of
+    the machine.
 
     Args:
-        action: The measured function.
-        seconds: Minimum total duration [s].
-        parts: Number of parts of the work, whose means determine the spread.
+        actions: The measured functions.
+        seconds: Minimum total duration of each action [s].
+        parts: Number of turns, and of the means that determine the spread.
     """
-    times, total, calls = [], 0.0, 0
+    times: list[list[float]] = [[] for _ in actions]
+    totals, calls = [0.0] * len(actions), [0] * len(actions)
     for _ in range(parts):
-        start, n = time.perf_counter(), 0
-        while (elapsed := time.perf_counter() - start) < seconds / parts:
-            action()
-            n += 1
-        times.append(elapsed / n)
-        total += elapsed
-        calls += n
-    return Mean(total / calls, Mean.of(times).spread)
+        for i, action in enumerate(actions):
+            start, n = time.perf_counter(), 0
+            while (elapsed := time.perf_counter() - start) < seconds / parts:
+                action()
+                n += 1
+            times[i].append(elapsed / n)
+            totals[i] += elapsed
+            calls[i] += n
+    return [
+        Mean(total / n, Mean.of(each).spread)
+        for total, n, each in zip(totals, calls, times, strict=True)
+    ]
 
 
 def best_of(action: Callable[[], object], seconds: float = 0.5, min_runs: int = 5) -> float:
