@@ -250,7 +250,8 @@ def test_people_do_not_react_to_those_behind_a_wall(
     )
     files.write(
         "obstacle.model.yaml",
-        "bodies: [{name: o, type: kinematic, footprints: [{type: circle, density: 0, radius: 0.2}]}]\n",
+        "bodies:\n  - name: post\n    type: kinematic\n"
+        "    footprints: [{type: circle, density: 0, radius: 0.2}]\n",
     )
     starts = {"a": (3.0, a, 0.0), "b": (start, b, math.pi)}
     tracks = {}
