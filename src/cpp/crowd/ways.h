@@ -47,10 +47,11 @@ class Ways {
 
   const FreeGrid& grid() const { return grid_; }
   const std::vector<Gate>& gates() const { return gates_; }
-  // Returns the indices of all gates within a distance of `kGateReach` of a point that are visible
-  // from everywhere near it, in ascending order, and of few others.
+  // Returns the indices of gates that are visible from a point, in ascending order: of those within
+  // a distance of `kGateReach`, all that are visible from its whole cell.
   SegmentGrid::Indices gates_in_view(Vec p) const { return gates_in_view_.near(p); }
-  // Returns the same for all further gates that are visible or contain the point.
+  // Returns the indices of all further gates within this distance that are visible or contain the
+  // point, in ascending order, and of few others.
   SegmentGrid::Indices other_gates(Vec p) const { return other_gates_.near(p); }
   std::shared_ptr<const Way> to(const Place& place);
   // Returns a way that is not kept.
