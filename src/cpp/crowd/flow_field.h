@@ -72,18 +72,20 @@ class FlowField {
   // seconds.
   static constexpr std::size_t kTileColumns = 8;
   static constexpr std::size_t kTileRows = 4;
-  static constexpr std::size_t kBlockColumns = 8 * kTileColumns;
-  static constexpr std::size_t kBlockRows = 8 * kTileRows;
+  static constexpr std::size_t kTilesPerRow = 8;
+  static constexpr std::size_t kBlockColumns = kTilesPerRow * kTileColumns;
+  static constexpr std::size_t kBlockRows = kTilesPerRow * kTileRows;
   using Tile = std::array<Direction, kTileColumns * kTileRows>;
   struct alignas(4096) Block {
-    std::array<Tile, 64> tiles;
+    std::array<Tile, kTilesPerRow * kTilesPerRow> tiles;
   };
 
   Direction& at(std::int64_t column, std::int64_t row) {
     const auto x = static_cast<std::size_t>(column);
     const auto y = static_cast<std::size_t>(row);
     Block& block = blocks_[y / kBlockRows * blocks_per_row_ + x / kBlockColumns];
-    Tile& tile = block.tiles[y % kBlockRows / kTileRows * 8 + x % kBlockColumns / kTileColumns];
+    Tile& tile =
+        block.tiles[y % kBlockRows / kTileRows * kTilesPerRow + x % kBlockColumns / kTileColumns];
     return tile[y % kTileRows * kTileColumns + x % kTileColumns];
   }
   const Direction& at(std::int64_t column, std::int64_t row) const {

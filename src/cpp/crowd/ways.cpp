@@ -9,22 +9,33 @@
 namespace flatland::crowd {
 namespace {
 
-// Returns the lists of gates that are visible from whole cells, or those of the other gates.
-SegmentGrid grid_of(const std::vector<Gate>& gates, const Walls& walls, bool are_in_view) {
+// Returns the lists of gates near each cell that satisfy a condition.
+SegmentGrid grid_of(const std::vector<Gate>& gates, const SegmentGrid::IsListed& is_listed) {
   constexpr double kCell = 0.5;  // m
   std::vector<Segment> centers;
   std::transform(gates.begin(), gates.end(), std::back_inserter(centers), [](const Gate& gate) {
     return Segment{gate.center, gate.center};
   });
-  const auto is_listed = [&](std::uint32_t i, Vec low, Vec high) {
+  return {centers, kCell, kGateReach, is_listed};
+}
+
+SegmentGrid grid_in_view(const std::vector<Gate>& gates, const Walls& walls) {
+  return grid_of(gates, [&](std::uint32_t i, Vec low, Vec high) {
+    return walls.is_in_view(gates[i].center, low, high);
+  });
+}
+
+// Returns the lists of gates that are not in view, but may be visible or contain a point.
+SegmentGrid grid_of_others(const std::vector<Gate>& gates, const Walls& walls,
+                           const SegmentGrid& in_view) {
+  return grid_of(gates, [&](std::uint32_t i, Vec low, Vec high) {
     const Gate& gate = gates[i];
-    const bool is_in_view = walls.is_in_view(gate.center, low, high);
-    if (is_in_view || are_in_view) return is_in_view == are_in_view;
     const Vec center = 0.5 * (low + high);
+    const SegmentGrid::Indices seen = in_view.near(center);  // both grids have the same cells
+    if (std::binary_search(seen.begin(), seen.end(), i)) return false;
     const double reach = std::sqrt(gate.radius2) + length(high - center);
     return length(gate.center - center) <= reach || !walls.is_hidden(gate.center, low, high);
-  };
-  return {centers, kCell, kGateReach, is_listed};
+  });
 }
 
 }  // namespace
@@ -53,8 +64,8 @@ Ways::Ways(FreeGrid grid, std::shared_ptr<const Walls> walls)
     : grid_(std::move(grid)),
       walls_(std::move(walls)),
       gates_(find_gates(grid_, *walls_)),
-      gates_in_view_(grid_of(gates_, *walls_, true)),
-      other_gates_(grid_of(gates_, *walls_, false)) {}
+      gates_in_view_(grid_in_view(gates_, *walls_)),
+      other_gates_(grid_of_others(gates_, *walls_, gates_in_view_)) {}
 
 std::shared_ptr<const Way> Ways::to(const Place& place) {
   Entry* entry = nullptr;

@@ -397,7 +397,7 @@ bool FreeMotion::begin(b2World& world, const BodiesByType& bodies, float dt,
   for (b2Body* body : bodies.dynamic) {
     if (is_moving(*body)) move_body(body);
   }
-  if (coasting_.size() < bodies.kinematic.size()) {
+  if (coasting_.size() < bodies.kinematic.size()) {  // otherwise, all coast
     for (b2Body* body : bodies.kinematic) {
       if (is_moving(*body) && !(may_coast && start_coasting(*body))) move_body(body);
     }
