@@ -1,7 +1,8 @@
 """Reading of images as 8-bit grey, by Pillow.
 
 The grey values are those that OpenCV 4 reads with `IMREAD_GRAYSCALE`, whose formulas for colours
-depend on the format of the file.
+depend on the format of the file. Unlike in OpenCV, values of PGM and PPM files are fractions of the
+maximum value in the header, as in `map_server`.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import mmap
 import struct
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, BinaryIO, Final
 
 import numpy as np
@@ -35,19 +37,40 @@ _SRGB_GAMMA: Final = 0.45455
 _ORIENTATION_TAG: Final = 0x0112
 _BITS_TAG: Final = 258
 _PHOTOMETRIC_TAG: Final = 262
+_ALPHA_MODES: Final = ("LA", "PA", "RGBA")
+_MAXIMUM: Final = "maximum"  # key of the information about an image of Pillow
 
 _pillow_limit = threading.Lock()
 
 
+@dataclass(frozen=True, eq=False)
+class ImageContent:
+    """The pixels of an image, from the top row to the bottom row.
+
+    Attributes:
+        grey: Grey values, shape (rows, columns). The alpha channel is ignored.
+        alpha: Opacities, shape (rows, columns); None if all pixels are opaque.
+        peak: Largest value of the file, of `scale`; None for a file of 8 bits per value or less.
+        scale: Value of the file that is white.
+    """
+
+    grey: GreyImage
+    alpha: GreyImage | None
+    peak: int | None
+    scale: int
+
+
 def read_grey_image(path: str) -> GreyImage:
+    """Reads an image as 8-bit grey; see `read_image`."""
+    return read_image(path).grey
+
+
+def read_image(path: str) -> ImageContent:
     """Reads an image as 8-bit grey; an alpha channel is ignored, not blended.
 
     Args:
         path: Image in one of the formats PNG, PGM, PPM, PBM, JPEG, BMP, TIFF, WebP, JPEG 2000, GIF
             and Sun raster. Of several images in a file, the first one is read.
-
-    Returns:
-        Pixels from the top row to the bottom row, shape (rows, columns).
 
     Raises:
         OSError: The file does not exist or is not an image.
@@ -60,7 +83,7 @@ def read_grey_image(path: str) -> GreyImage:
             raise OSError(f"cannot read {path} as an image: {reason}") from error
 
 
-def _read(file: BinaryIO) -> GreyImage:
+def _read(file: BinaryIO) -> ImageContent:
     # `PIL.Image.open` would import the modules of all formats for some of them, and warn about
     # images of more than 90 million pixels.
     kind = image_format(file.read(SIGNATURE_SIZE))
@@ -73,14 +96,15 @@ def _read(file: BinaryIO) -> GreyImage:
         return _decode(data, kind)
 
 
-def _decode(file: BinaryIO | mmap.mmap, kind: str) -> GreyImage:
+def _decode(file: BinaryIO | mmap.mmap, kind: str) -> ImageContent:
     image = _open(file, kind)
     width, height = image.size
     if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
         raise ValueError(f"{width} x {height} pixels are more than supported")
     stored = _raw_mode(image.tile[0]) if image.tile else image.mode
     images = [image]
-    if kind in ("Png", "Tiff") and stored.startswith("RGB") and ";16" in stored:
+    maximum = _maximum(image)
+    if _has_wide_colors(stored) and (kind in ("Png", "Tiff") or maximum is not None):
         images.append(_open(file, kind, low_bytes=True))
     orientation = _orientation(image) if kind == "Jpeg" else 1  # Pillow turns TIFF images.
     for each in images:
@@ -89,18 +113,42 @@ def _decode(file: BinaryIO | mmap.mmap, kind: str) -> GreyImage:
     formula: Callable[..., Pixels] = lambda pixels: pixels  # noqa: E731
     if matrix is None:
         formula = _formula(image, kind, stored)
+    if maximum is not None:
+        formula = _scaled(formula, image.mode, maximum)
     width, height = image.size
     grey = np.empty((height, width), np.uint8)
+    has_alpha = image.mode in _ALPHA_MODES or "transparency" in image.info
+    alpha: GreyImage | None = None
+    is_wide = image.mode.startswith("I") or len(images) > 1
+    peak = 0
     # Strips save the memory of intermediate results.
     rows = max(1, _STRIP_PIXELS // width)
     for top in range(0, height, rows):
         box = (0, top, width, min(top + rows, height))
         strips = [each.crop(box) for each in images]
+        if has_alpha:
+            opacity = _opacity(strips[0])
+            if alpha is None and opacity.getextrema()[0] < 255:
+                alpha = np.full_like(grey, 255)
+            if alpha is not None:
+                alpha[top : box[3]] = opacity
         if matrix is not None:
             colors = strips[0] if image.mode == "RGB" else strips[0].convert("RGB")
             strips = [colors.convert("L", matrix)]
-        grey[top : box[3]] = formula(*map(np.asarray, strips))
-    return _turned(grey, orientation)
+        pixels = [np.asarray(strip) for strip in strips]
+        if is_wide:
+            values = pixels[0] if len(pixels) == 1 else _wide(*pixels)[..., :3]
+            peak = max(peak, int(values.max()))
+        grey[top : box[3]] = formula(*pixels)
+    scale = maximum or (65535 if is_wide else 255)
+    return ImageContent(_turned(grey, orientation), alpha, peak if is_wide else None, scale)
+
+
+def _opacity(image: Any) -> Any:
+    """Returns the alpha channel of an image with alpha, or with transparent colours."""
+    if image.mode not in ("LA", "RGBA"):
+        image = image.convert("RGBA")
+    return image.getchannel("A")
 
 
 def _open(file: BinaryIO | mmap.mmap, kind: str, *, low_bytes: bool = False) -> Any:
@@ -116,6 +164,7 @@ def _open(file: BinaryIO | mmap.mmap, kind: str, *, low_bytes: bool = False) -> 
     image = getattr(importlib.import_module(f"PIL.{kind}ImagePlugin"), f"{kind}ImageFile")(file)
     image.draft("L", None)  # JPEG: the luminance of the file
     if kind == "Ppm":
+        image.info[_MAXIMUM] = _stored_maximum(image)
         image.tile = [_unscaled(tile, image.mode) for tile in image.tile]
     if kind == "Tiff":
         bits = image.tag_v2.get(_BITS_TAG, (1,))
@@ -134,8 +183,30 @@ def _raw_mode(tile: Any) -> str:
     return str(arguments if isinstance(arguments, str) else arguments[0])
 
 
+def _stored_maximum(image: Any) -> int | None:
+    """Returns the largest value of a PNM file by its header, None if values need no scaling.
+
+    Pillow reduces 16-bit colours in plain text to 8 bits itself.
+    """
+    decoder, arguments = image.tile[0][0], image.tile[0][3]
+    if decoder not in ("ppm", "ppm_plain") or image.mode == "1":
+        return None
+    maximum = int(arguments[1])
+    is_scaled = decoder == "ppm_plain" and image.mode == "RGB" and maximum > 255
+    return None if is_scaled or maximum in (255, 65535) else maximum
+
+
+def _maximum(image: Any) -> int | None:
+    maximum: int | None = image.info.get(_MAXIMUM)
+    return maximum
+
+
 def _unscaled(tile: Any, mode: str) -> Any:
-    """Returns a part of a binary PNM file whose values are not scaled to the range of the mode."""
+    """Returns a part of a PNM file whose values are not scaled to the range of the mode."""
+    if tile[0] == "ppm_plain" and mode != "1":
+        stored, maximum = tile[3]
+        if mode == "I" or maximum < 256:
+            return _changed(tile, tile[0], (stored, 65535 if mode == "I" else 255))
     if tile[0] != "ppm":
         return tile
     stored = {"I": "I;16B"}.get(mode, mode if tile[3][1] < 256 else f"{mode};16B")
@@ -256,7 +327,34 @@ def _has_plain_colors(image: Any, kind: str, stored: str) -> bool:
     """Returns whether colours have 8 bits, and no gamma is applied."""
     if kind == "Png" and _gamma(image) is not None:
         return False
+    if _maximum(image) is not None:
+        return False
     return stored not in _FEW_BITS and not (kind in ("Png", "Tiff") and ";16" in stored)
+
+
+def _has_wide_colors(stored: str) -> bool:
+    """Returns whether colours have 16 bits, by how they are stored."""
+    return stored.startswith("RGB") and ";16" in stored
+
+
+def _scaled(formula: Callable[..., Pixels], mode: str, maximum: int) -> Callable[..., Pixels]:
+    """Returns a function of values from 0 to a maximum, which are scaled to 255.
+
+    Unlike the reference, whose OpenCV scales values in plain text but not binary ones. `map_server`
+    scales both, rounded down; it refuses maxima above 255, which that of ROS 2 scales as well.
+
+    Args:
+        formula: Function of values from 0 to 255.
+        mode: Mode of the image.
+        maximum: Largest value by the header.
+    """
+
+    def grey(pixels: Pixels, low: Pixels | None = None) -> Pixels:
+        values = pixels.astype(np.int64) if low is None else _wide(pixels, low).astype(np.int64)
+        scaled = np.minimum(values * 255 // maximum, 255)
+        return scaled if mode == "I" else formula(scaled.astype(np.uint8))
+
+    return grey
 
 
 def _weights(kind: str) -> tuple[int, int, int]:

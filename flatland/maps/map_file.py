@@ -12,7 +12,8 @@ from flatland.config.inputs import Inputs
 from flatland.config.reader import ReadYaml, YamlReader, read_yaml
 from flatland.errors import MapFileError, Place
 from flatland.geometry import FloatArray, Pose
-from flatland.maps.grey_image import read_grey_image
+from flatland.maps.grey_image import read_image
+from flatland.maps.image_problems import image_problem, threshold_problem
 from flatland.maps.line_segments import read_line_segments
 from flatland.maps.map_image import image_edges, threshold_in_place
 from flatland.maps.unreadable_image import why_unreadable
@@ -111,20 +112,16 @@ def _load_image(reader: YamlReader, inputs: Inputs, layer_name: str, simplify: i
     resolution_place = reader.subnode("resolution").place
     if resolution > _MAX_USUAL_RESOLUTION:
         reader.warn("resolution", f"{resolution:g} m per pixel; 0.05 is usual")
-    if not 0 <= occupied_thresh <= 1:
-        inputs.warn(
-            reader.subnode("occupied_thresh").place,
-            'Layer "%s": "occupied_thresh" is %g, outside the range of pixel values, 0 to 1',
-            layer_name,
-            occupied_thresh,
-        )
 
-    def make_edges() -> tuple[FloatArray, int]:
-        mask = threshold_in_place(read_grey_image(image_path), occupied_thresh)
-        return image_edges(mask, resolution, simplify)
+    def make_edges() -> tuple[FloatArray, int, str, str]:
+        image = read_image(image_path)
+        wrong_threshold = threshold_problem(image, occupied_thresh)
+        problem = "" if wrong_threshold else image_problem(image, occupied_thresh)
+        mask = threshold_in_place(image.grey, occupied_thresh)
+        return *image_edges(mask, resolution, simplify), wrong_threshold, problem
 
     try:
-        edges, exact_edge_count = inputs.parsed(
+        edges, exact_edge_count, wrong_threshold, problem = inputs.parsed(
             image_path, ("edges", occupied_thresh, resolution, simplify), make_edges
         )
     except OSError as error:
@@ -135,6 +132,12 @@ def _load_image(reader: YamlReader, inputs: Inputs, layer_name: str, simplify: i
         ) from error
     except ValueError as error:
         raise reader.invalid("resolution", str(error)) from error
+    if wrong_threshold and reader.is_complete:
+        place = reader.subnode("occupied_thresh").place
+        inputs.warn(place, 'Layer "%s": %s (%s)', layer_name, wrong_threshold, image_path)
+    elif problem and reader.is_complete:
+        place = reader.subnode("image").place
+        inputs.warn(place, 'Layer "%s", image "%s": %s', layer_name, image_path, problem)
     return LayerMap(origin, edges, exact_edge_count, reader.path, unknown_keys, resolution_place)
 
 
@@ -153,6 +156,13 @@ def _load_line_segments(reader: YamlReader, inputs: Inputs, layer_name: str) -> 
         # A file outside of the allowed folders is not compared with those beside it.
         hint = "" if isinstance(error, PermissionError) else missing_file(data_path, "data")
         raise MapFileError(located.message, place=located.place, hint=hint) from error
+    if not len(segments):
+        inputs.warn(
+            reader.subnode("data").place,
+            'Layer "%s": no line segments in %s, so that the layer has no walls',
+            layer_name,
+            data_path,
+        )
     with np.errstate(over="ignore"):
         edges = (segments * scale).astype(np.float32)
     if not np.isfinite(edges).all():

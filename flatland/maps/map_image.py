@@ -19,6 +19,11 @@ _OPENING = np.array(
 )
 
 
+def lowest_on(occupied_thresh: float) -> int:
+    """Returns the smallest grey value that is on, 256 if no value is."""
+    return int(np.searchsorted(np.arange(256) / 255.0, occupied_thresh))
+
+
 def threshold_in_place(image: GreyImage, occupied_thresh: float) -> GreyImage:
     """Sets each pixel to on (1) where value / 255 >= `occupied_thresh`, otherwise to off (0).
 
@@ -29,9 +34,7 @@ def threshold_in_place(image: GreyImage, occupied_thresh: float) -> GreyImage:
     Returns:
         The same array.
     """
-    # The smallest grey value that is on, 256 if no value is.
-    lowest = int(np.searchsorted(np.arange(256) / 255.0, occupied_thresh))
-    np.greater_equal(image, lowest, out=image.view(np.bool_))
+    np.greater_equal(image, lowest_on(occupied_thresh), out=image.view(np.bool_))
     return image
 
 

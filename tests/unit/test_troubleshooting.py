@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 from pages import code_blocks, pattern_of
+from PIL import Image
 from plugin_manifests import manifest
 from programs import run_program
 
@@ -93,6 +94,11 @@ def missing_image(case: Case) -> str:
     return case.load("properties: {}\nlayers: [{name: walls, map: map.yaml}]\n")
 
 
+def white_image(case: Case) -> str:
+    Image.new("L", (9, 9), 255).save(case.folder / "map.png")
+    return missing_image(case)
+
+
 def stuck(case: Case) -> str:
     """The robot is driven into a corridor that is narrower than itself."""
     case.write(map_yaml=MAP, walls_dat="0 0.19 9 0.19\n0 -0.19 9 -0.19\n")
@@ -150,6 +156,7 @@ PROVOKED: dict[str, Callable[[Case], str]] = {
     "The file is not valid YAML": lambda case: case.load("properties: {}\nlayers: [\nmodels: []\n"),
     "A model file does not exist": lambda case: case.load(robot=""),
     "A map image cannot be loaded": missing_image,
+    "The world is empty, or the robot is outside of it": white_image,
     "A name is used twice": lambda case: case.load(
         WORLD.replace("robot.yaml}]", "robot.yaml}, {name: r1, model: robot.yaml}]")
     ),

@@ -170,7 +170,7 @@ def files() -> dict[str, bytes]:
         found[f"PNG {name} RGB"] = png(COLORS, 6, chunk)
         found[f"PNG {name} grey"] = png(GREY, 0, chunk)
         found[f"PNG {name} palette"] = png(GREY, 3, chunk, palette)
-    for maximum in (1, 100, 254, 255, 1000, 65535):
+    for maximum in (255, 65535):
         found[f"PGM {maximum}"] = pnm("P5", maximum, WIDE[..., 0].astype(int) % (maximum + 1))
         found[f"PPM {maximum}"] = pnm("P6", maximum, WIDE[..., :3].astype(int) % (maximum + 1))
     for order in "<>":
@@ -208,6 +208,40 @@ def test_the_grey_values_are_those_of_opencv(tmp_path: Path, name: str) -> None:
     assert image.dtype == np.uint8
     assert image.flags.c_contiguous
     np.testing.assert_array_equal(image, opencv_grey(cv2, FILES[name]))
+
+
+@pytest.mark.parametrize("magic", ["P2", "P3", "P5", "P6"])
+@pytest.mark.parametrize("maximum", [1, 15, 100, 254, 1000, 65534])
+def test_values_of_pnm_files_are_fractions_of_the_maximum(
+    tmp_path: Path, magic: str, maximum: int
+) -> None:
+    """map_server scales binary values, too, and rounds down; OpenCV reads them as they are."""
+    is_color = magic in ("P3", "P6")
+    values = WIDE[..., :3].astype(int) % (maximum + 1) if is_color else WIDE[..., 0].astype(int)
+    values = values % (maximum + 1)
+    data = pnm(magic, maximum, values)
+    if magic in ("P2", "P3"):
+        header = f"{magic}\n# by hand\n{SIZE[0]} {SIZE[1]}\n{maximum}\n"
+        data = (header + " ".join(map(str, values.ravel())) + "\n").encode()
+    path = tmp_path / "map.pgm"
+    path.write_bytes(data)
+    image = read_grey_image(str(path))
+    scaled = values * 255 // maximum
+    if is_color:
+        scaled = np.floor(scaled @ (4899, 9617, 1868) / 2**14 + 0.5)
+    if magic == "P3" and maximum > 255:  # Pillow itself reduces these to 8 bits, and rounds.
+        np.testing.assert_allclose(image, scaled, atol=1)
+    else:
+        np.testing.assert_array_equal(image, scaled)
+    if magic == "P2" and maximum < 256:  # the ones that OpenCV scales
+        cv2 = pytest.importorskip("cv2")
+        np.testing.assert_array_equal(image, opencv_grey(cv2, data))
+
+
+def test_values_above_the_maximum_are_white(tmp_path: Path) -> None:
+    path = tmp_path / "map.pgm"
+    path.write_bytes(b"P5\n4 1\n100\n" + bytes((0, 50, 100, 255)))
+    assert read_grey_image(str(path)).tolist() == [[0, 127, 255, 255]]
 
 
 def test_a_gif_and_an_animation_are_read(tmp_path: Path) -> None:
