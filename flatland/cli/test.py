@@ -15,7 +15,7 @@ from flatland.config.collecting_reader import ErrorCollector
 from flatland.errors import Place
 from flatland.scenarios.cluster import Cluster
 from flatland.scenarios.columns import FAULTS
-from flatland.scenarios.comparison import Difference, became_worse, compare
+from flatland.scenarios.comparison import Change, Comparison, compare
 from flatland.scenarios.controllers import INCLUDED, POLICY
 from flatland.scenarios.episode import Options, Result
 from flatland.scenarios.junit import write_junit
@@ -35,7 +35,12 @@ from flatland.scenarios.suite import (
     runs_of,
     scenario_files,
 )
-from flatland.scenarios.summary import markdown_table, summarize, summary_table
+from flatland.scenarios.summary import (
+    markdown_table,
+    repetition_notes,
+    summarize,
+    summary_table,
+)
 from flatland.scenarios.workers import WorkerLimits
 
 _EXAMPLES = (
@@ -47,7 +52,11 @@ _EXAMPLES = (
     "flatland test office --robot 'stack.launch planner:=dwa' --goal-action move_base",
     "flatland test office --robot 'stack.launch.py planner:=dwa'",
 )
+REGRESSIONS = ("any", "significant")
+"""Which runs from pass to fail make a comparison with a baseline fail."""
+
 _MEGABYTE = 1 << 20
+_MOST_CHANGES = 100  # runs from pass to fail, or back, that are printed; the report has all
 
 
 def add(commands: Commands) -> None:
@@ -59,8 +68,8 @@ def add(commands: Commands) -> None:
         summary="score controllers in scenarios",
         description="Runs scenarios with controllers, on all cores, prints a table, and writes a "
         "report and the results of all runs. The exit code is 1 if a run does not meet its "
-        "conditions; with --baseline, if a measure became significantly worse or a run has an "
-        "error.",
+        "conditions; with --baseline, if a run that passed before does not pass, a measure became "
+        "significantly worse, or a run has an error.",
         examples=_EXAMPLES,
     )
     parser.add_argument(
@@ -139,6 +148,13 @@ def _add_results(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--baseline", type=Path, metavar="FILE", help="results.json of an earlier version"
+    )
+    group.add_argument(
+        "--regressions",
+        choices=REGRESSIONS,
+        default=REGRESSIONS[0],
+        help="runs from pass to fail that make a comparison with a baseline fail: any, or only so "
+        f"many that passed is significantly worse (default: {REGRESSIONS[0]})",
     )
     group.add_argument(
         "--junit", type=Path, metavar="FILE", help="JUnit XML (default: junit.xml in the folder)"
@@ -221,7 +237,7 @@ def _test(options: argparse.Namespace) -> int:
     if stop.signal:
         print(f"interrupted: {counted(results.missing, 'run')} missing; --continue makes them")
         return 128 + stop.signal
-    return _exit_code(results, comparisons, baseline)
+    return _exit_code(options, results, comparisons)
 
 
 def _list(options: argparse.Namespace) -> int:
@@ -302,8 +318,8 @@ def _run(options: argparse.Namespace, runs: Sequence[Run], stop: StopSignals) ->
 
 def _comparisons(
     results: SuiteResults, controllers: Sequence[str], baseline: SuiteResults | None
-) -> dict[str, list[Difference]]:
-    """Returns the differences to a baseline, or between the first and the other controllers."""
+) -> dict[str, Comparison]:
+    """Returns the comparisons with a baseline, or of the first with the other controllers."""
     rows = {
         name: [row for row in results.rows if row["controller"] == name] for name in controllers
     }
@@ -323,14 +339,13 @@ def _comparisons(
             title += f" ({old_name})"
         return {title: compare(old, new)}
     return {
-        f"{name} against the baseline": compare(before[name], new)
+        f"{name} against the baseline": compare(before.get(name, ()), new)
         for name, new in rows.items()
-        if name in before
     }
 
 
 def _write(
-    options: argparse.Namespace, results: SuiteResults, comparisons: dict[str, list[Difference]]
+    options: argparse.Namespace, results: SuiteResults, comparisons: dict[str, Comparison]
 ) -> None:
     folder = options.out
     write_results(results, folder)
@@ -340,20 +355,16 @@ def _write(
 
 
 def _print(
-    options: argparse.Namespace, results: SuiteResults, comparisons: dict[str, list[Difference]]
+    options: argparse.Namespace, results: SuiteResults, comparisons: dict[str, Comparison]
 ) -> None:
     summaries = summarize(results.rows)
     print(markdown_table(summaries) if options.markdown else summary_table(summaries))
-    if options.baseline is not None and not comparisons:
-        print(f"\n{options.baseline}: no runs of {options.robot}")
-    for title, differences in comparisons.items():
+    notes = repetition_notes(results.rows)
+    if notes:
+        print("\n" + "\n".join(notes))
+    for title, comparison in comparisons.items():
         print(f"\n{title}:")
-        shown = [one for one in differences if one.verdict]
-        for one in shown:
-            change = f"{one.before:.4g} -> {one.after:.4g}"
-            print(f"  {one.measure} is {one.verdict}: {change} (p = {one.p_value:.2g})")
-        if not shown:
-            print("  no significant difference" if differences else "  no runs in common")
+        _print_comparison(comparison, has_baseline=options.baseline is not None)
     failed = [one for one in worst_first(results.results) if not one.row["passed"]]
     if failed and not options.markdown:
         worst = failed[0]
@@ -370,18 +381,53 @@ def _print(
         print(f"with links that replay the runs: flatland replay {options.out} --view")
 
 
+def _print_comparison(comparison: Comparison, *, has_baseline: bool) -> None:
+    if not comparison.pairs:
+        print("  no runs in common")
+        return
+    if has_baseline:
+        _print_changes("from pass to fail", comparison.lost)
+        _print_changes("from fail to pass", comparison.gained)
+        for number, where in (
+            (comparison.only_before, "only in the baseline"),
+            (comparison.only_after, "not in the baseline"),
+        ):
+            if number:
+                print(f"  {counted(number, 'run')} {where}")
+    shown = [one for one in comparison.differences if one.verdict]
+    for one in shown:
+        change = f"{one.before:.4g} -> {one.after:.4g}"
+        print(f"  {one.measure} is {one.verdict}: {change} (p = {one.p_value:.2g})")
+    if not shown:
+        pairs = counted(comparison.distinct, "distinct pair")
+        print(f"  no significant difference of a measure in {pairs} of runs")
+
+
+def _print_changes(title: str, changes: Sequence[Change]) -> None:
+    if not changes:
+        return
+    print(f"  {counted(len(changes), 'run')} {title}:")
+    for change in changes[:_MOST_CHANGES]:
+        print(f"    {change}")
+    if len(changes) > _MOST_CHANGES:
+        print(f"    and {len(changes) - _MOST_CHANGES} more, see the report")
+
+
 def _exit_code(
-    results: SuiteResults,
-    comparisons: dict[str, list[Difference]],
-    baseline: SuiteResults | None,
+    options: argparse.Namespace, results: SuiteResults, comparisons: dict[str, Comparison]
 ) -> int:
-    if baseline is None:
+    if options.baseline is None:
         return 0 if all(row["passed"] for row in results.rows) else 1
+    has_error = any(row["outcome"] in FAULTS for row in results.rows)
+    is_worse = any(_is_worse(options, one) for one in comparisons.values())
+    return 1 if has_error or is_worse else 0
+
+
+def _is_worse(options: argparse.Namespace, comparison: Comparison) -> bool:
     # A baseline without runs in common says nothing.
-    if not any(comparisons.values()):
-        return 1
-    is_worse = any(became_worse(differences) for differences in comparisons.values())
-    return 1 if is_worse or any(row["outcome"] in FAULTS for row in results.rows) else 0
+    if not comparison.pairs or comparison.worse:
+        return True
+    return options.regressions == "any" and bool(comparison.lost)
 
 
 # -- types of values -----------------------------------------------------------------------

@@ -73,6 +73,7 @@ COLUMNS: Final = {
         Column("goal_x", float, "m"),
         Column("goal_y", float, "m"),
         Column("steps", int),
+        Column("trajectory", str),
         Column("state_hash", str),
         Column("failures", str),
         Column("error", str),

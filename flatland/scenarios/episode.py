@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import itertools
 import math
 import os
 import socket
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,7 +20,7 @@ from flatland.scenarios.connection import StackError
 from flatland.scenarios.controllers import find_controller
 from flatland.scenarios.events import Events
 from flatland.scenarios.measures import Measures, distance_left, success_weighted_length
-from flatland.scenarios.outline import outline_of
+from flatland.scenarios.outline import models_of, outline_of
 from flatland.scenarios.planner import PlanningError, shortest_length
 from flatland.scenarios.stack import GaveUpError, Stack, opened
 from flatland.scenarios.stack_options import StackCommand, StackOptions
@@ -31,7 +30,7 @@ from flatland.values import Twist
 from flatland.world import World
 
 if TYPE_CHECKING:
-    from flatland.scenarios.outline import Outline
+    from flatland.scenarios.outline import Drawn, Line, Outline
     from flatland.scenarios.scenario import Run, Scenario
 
 _MAX_NAME: Final = 120  # characters of the name of a recording
@@ -70,6 +69,8 @@ class Result:
         events: Times and places of the robot at events: (time, x, y, action).
         outline: The walls, None if the world could not be loaded.
         recording: File of the recording, relative to the folder of the results; empty without one.
+        jumps: Kidnappings (time, x, y, x, y) of the robot from one place to another [s, m].
+        models: The models at the end, for pictures.
     """
 
     row: Row
@@ -78,6 +79,21 @@ class Result:
     events: list[tuple[float, float, float, str]] = field(default_factory=list)
     outline: Outline | None = None
     recording: str = ""
+    jumps: list[tuple[float, float, float, float, float]] = field(default_factory=list)
+    models: list[Drawn] = field(default_factory=list)
+
+    @property
+    def tracks(self) -> list[Line]:
+        """The parts of the path (x, y) between the jumps [m]."""
+        tracks: list[Line] = [[]]
+        jumps = list(self.jumps)
+        for time_of, x, y in self.path:
+            while jumps and time_of >= jumps[0][0]:
+                _, x1, y1, x2, y2 = jumps.pop(0)
+                tracks[-1].append((x1, y1))
+                tracks.append([(x2, y2)])
+            tracks[-1].append((x, y))
+        return [track for track in tracks if track]
 
 
 def run_scenario(
@@ -266,12 +282,14 @@ def _drive(scenario: Scenario, stage: Stage, driver: _Driver, result: Result) ->
     steps_per_period = max(1, round(stage.task.period / step_size))
     events, measures = Events(scenario, stage), Measures(stage)
     reached, outcome, steps, reason = 0, "", 0, None
+    jumped_after: list[int] = []  # number of goals that were reached before each jump
     start = time.perf_counter()
     try:
         while not outcome:
             events.update(reached)
             if events.kidnapped:
                 measures.moved()
+                jumped_after.append(reached)
             x, y, _theta = stage.robot.pose
             result.events += [(stage.time, x, y, action) for action in events.done]
             if steps % steps_per_period == 0:
@@ -297,6 +315,11 @@ def _drive(scenario: Scenario, stage: Stage, driver: _Driver, result: Result) ->
         wall_time = time.perf_counter() - start
         measures.sample()
         result.path = _thinned(measures.path)
+        result.jumps = [
+            (round(t, 3), round(x1, 3), round(y1, 3), round(x2, 3), round(y2, 3))
+            for t, x1, y1, x2, y2 in measures.jumps
+        ]
+        result.models = models_of(world, stage.robot.name, measures.touched)
         result.row |= measures.values()
         result.row |= {
             "outcome": outcome,
@@ -317,7 +340,7 @@ def _drive(scenario: Scenario, stage: Stage, driver: _Driver, result: Result) ->
             **driver.measures,
         }
     result.row["recoveries"] = driver.recoveries
-    result.row |= _efficiency(stage, result.row)
+    result.row |= _efficiency(scenario, stage, result, measures, jumped_after)
     people = frozenset(measures.people)
     failures = [condition.failure(result.row, people) for condition in scenario.require]
     result.row["passed"] = not any(failures)
@@ -334,17 +357,43 @@ def _outcome(scenario: Scenario, measures: Measures, reached: int, goals: int) -
     return "stuck" if limits.stuck is not None and measures.stuck_for >= limits.stuck else ""
 
 
-def _efficiency(stage: Stage, row: Row) -> Row:
-    """Returns the columns about the shortest path; it is only computed for successes."""
-    if not row["success"]:
+def _efficiency(
+    scenario: Scenario,
+    stage: Stage,
+    result: Result,
+    measures: Measures,
+    jumped_after: Sequence[int],
+) -> Row:
+    """Returns the columns about the shortest path; it is only computed for successes.
+
+    Both the shortest path and that of the robot lead from the start to the edge of the last goal,
+    where the success is declared. A run with jumps has a shortest path to each place from which the
+    robot was taken, and one from each place to which it was brought.
+
+    Args:
+        scenario: The scenario.
+        stage: The world and the goals.
+        result: The result, with the outcome.
+        measures: The measures of the run.
+        jumped_after: Number of goals that were reached before each jump.
+    """
+    if not result.row["success"]:
         return {"spl": 0.0}
-    corners = [stage.start[:2], *stage.task.goals]
+    tolerance = scenario.tolerance
+    goals = [(goal, tolerance) for goal in stage.task.goals]
+    here, first, shortest = stage.start[:2], 0, 0.0
     try:
-        shortest = sum(shortest_length(stage.task, a, b) for a, b in itertools.pairwise(corners))
+        for (_, x1, y1, x2, y2), reached in zip(measures.jumps, jumped_after, strict=True):
+            shortest += shortest_length(stage.task, here, [*goals[first:reached], ((x1, y1), 0.0)])
+            here, first = (x2, y2), reached
+        shortest += shortest_length(stage.task, here, goals[first:])
     except PlanningError:  # between walls that the robot passes with less room than the grid
         return {"spl": None}
-    spl = success_weighted_length(True, shortest, row["path_length"])
-    return {"shortest_path": shortest, "spl": spl}
+    length = measures.length_to(goals[-1][0], tolerance)
+    return {
+        "shortest_path": shortest,
+        "spl": success_weighted_length(True, shortest, length),
+    }
 
 
 def _thinned(path: list[tuple[float, float, float]]) -> list[tuple[float, float, float]]:

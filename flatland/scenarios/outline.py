@@ -1,9 +1,9 @@
-"""The walls of a world as lines, for pictures of runs."""
+"""The walls and models of a world as lines, for pictures of runs."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 Line = list[tuple[float, float]]
 
+Drawn = tuple[str, str, list[Line]]
+"""Name of a model, its role and its outlines [m]; the role is `robot`, `hit` or `model`."""
+
 
 @dataclass(frozen=True, slots=True)
 class Outline:
@@ -24,7 +27,7 @@ class Outline:
 
     Attributes:
         key: Hash of the lines; equal for equal walls.
-        lines: Connected points of walls and static models [m].
+        lines: Connected points of walls [m].
     """
 
     key: str
@@ -35,7 +38,7 @@ _CIRCLE_CORNERS: Final = 16
 
 
 def outline_of(world: World) -> Outline:
-    """Returns the walls of all layers, each edge once, and static models, rounded to 1 cm."""
+    """Returns the walls of all layers, each edge once, rounded to 1 cm."""
     edges: dict[tuple[tuple[float, float], tuple[float, float]], None] = {}
     for layer in world.layers:
         for x1, y1, x2, y2 in np.round(layer.world_edges, 2).tolist():
@@ -48,14 +51,31 @@ def outline_of(world: World) -> Outline:
             lines[-1].append(b)
         else:
             lines.append([a, b])
-    for model in world.models:
-        lines += [line for body in model.bodies if body.type == "static" for line in _shapes(body)]
     digest = hashlib.sha256(repr(lines).encode()).hexdigest()[:16]
     return Outline(digest, lines)
 
 
+def models_of(world: World, robot: str, hit: Collection[str]) -> list[Drawn]:
+    """Returns the outlines of all models at their current poses, rounded to 1 cm.
+
+    Args:
+        world: The world.
+        robot: Name of the robot.
+        hit: Names of the models that the robot has touched.
+    """
+    drawn: list[Drawn] = []
+    for model in world.models:
+        lines = [line for body in model.bodies for line in _shapes(body)]
+        role = "robot" if model.name == robot else "hit" if model.name in hit else "model"
+        if lines:
+            drawn.append((model.name, role, lines))
+    return drawn
+
+
 def _shapes(body: Body) -> Iterator[Line]:
     for fixture in body.fixtures:
+        if fixture.is_sensor:
+            continue
         if fixture.shape == "circle":
             points = circle_points(fixture.center, fixture.radius, _CIRCLE_CORNERS)
         else:

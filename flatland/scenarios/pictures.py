@@ -19,9 +19,17 @@ _LABEL: Final = 110.0  # width of the labels of a plot [px]
 
 
 def run_picture(result: Result, walls: Sequence[Line]) -> str:
-    """Returns the picture of a run: walls, the path of the robot, start, goals and events."""
-    points = [(x, y) for _, x, y in result.path]
+    """Returns the picture of a run: walls, models at its end, the path, goals and events.
+
+    A kidnapping is a dashed line between two parts of the path.
+    """
+    tracks = result.tracks
+    points = [point for track in tracks for point in track]
     everything = [point for line in walls for point in line] + points + list(result.goals)
+    # Models may have been put far away.
+    for _, role, lines in result.models:
+        if role == "hit" or not walls:
+            everything += [point for line in lines for point in line]
     if not everything:
         return ""
     xs, ys = [x for x, _ in everything], [y for _, y in everything]
@@ -41,8 +49,18 @@ def run_picture(result: Result, walls: Sequence[Line]) -> str:
         return "".join(parts)
 
     shapes = [f'<path class="walls" d="{path(walls)}"/>']
+    for name, role, lines in result.models:
+        title = f"{name}, hit by the robot" if role == "hit" else name
+        shapes.append(
+            f'<path class="model {role}" d="{path(lines)}"><title>{escape(title)}</title></path>'
+        )
     if points:
-        shapes.append(f'<path class="track" d="{path([points])}"/>')
+        shapes.append(f'<path class="track" d="{path(tracks)}"/>')
+        for time, x1, y1, x2, y2 in result.jumps:
+            shapes.append(
+                f'<path class="jump" d="{path([[(x1, y1), (x2, y2)]])}">'
+                f"<title>moved at {time:.2f} s</title></path>"
+            )
         shapes.append(_dot(*place(*points[0]), 4, "start"))
     for number, (x, y) in enumerate(result.goals, 1):
         px, py = place(x, y)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -22,6 +23,14 @@ _COMFORT: Final = 0.35  # preferred distance to obstacles [m]
 _DISCOMFORT: Final = 2.0  # additional cost of a way without it, relative to its length
 _NEAR: Final = 3.0  # largest distance of start and goal to the grid, in spacings
 _SIGHT: Final = 0.05  # distance of the samples of a shortcut [m]
+_SWEEPS: Final = 50  # over all places of a path that is tightened
+_LEAST_GAIN: Final = 1e-5  # of a sweep after which there is another one [m]
+_TRISECTIONS: Final = 40  # of an arc
+# Largest length of a way on the grid without obstacles, relative to the straight distance.
+_MOST_OCTILE: Final = math.hypot(1.0, math.sqrt(2) - 1.0)
+
+Place = tuple["Vector2", float]
+"""Center and radius of a place that counts as reached within the radius [m]."""
 
 
 class PlanningError(Exception):
@@ -43,7 +52,7 @@ def plan_path(
     Raises:
         PlanningError: There is no path.
     """
-    grid = _Grid(task, start, goal, _walls(task) if only_walls else None)
+    grid = _Grid(task, start, [goal], _walls(task) if only_walls else None)
     preferred = grid.free(_COMFORT)
     for margin in _MARGINS:
         path = grid.search(start, goal, grid.free(margin), preferred)
@@ -52,22 +61,105 @@ def plan_path(
     raise PlanningError(_no_path(start, goal))
 
 
-def shortest_length(task: Task, start: Vector2, goal: Vector2) -> float:
-    """Returns the length of a shortest path, with shortcuts between the points of the grid [m].
+def shortest_length(task: Task, start: Vector2, places: Sequence[Place]) -> float:
+    """Returns the length of a shortest path from a start through places in their order [m].
 
-    Only walls and static models are considered.
+    The path leads to the edge of each place. It is found by A* on the grid, then shortened by
+    straight lines between its points; finally, the points at which it reaches the places are moved
+    to where the path is shortest. Only walls and static models are considered.
+
+    Args:
+        task: The robot and its world.
+        start: Start of the path [m].
+        places: Centers and radii of the places [m].
 
     Raises:
         PlanningError: There is no path.
     """
     walls = _walls(task)
-    grid = _Grid(task, start, goal, walls)
+    grid = _Grid(task, start, [place for place, _ in places], walls)
     free = grid.free(_MARGINS[-1])
-    path = grid.search(start, goal, free, free)
-    if path is None:
-        raise PlanningError(_no_path(start, goal))
-    corners = _shortened(np.concatenate([[start], path, [goal]]), task, walls)
+    corners, reached = np.array([start]), [0]
+    for center, radius in places:
+        here = (float(corners[-1, 0]), float(corners[-1, 1]))
+        if math.dist(here, center) > radius:
+            path = grid.search(here, center, free, free, radius)
+            if path is None:
+                raise PlanningError(_no_path(here, center))
+            end = _entry(path[-1], None, np.array(center), radius)
+            leg = np.concatenate([[here], path, [end]])
+            corners = np.concatenate([corners, _shortened(leg, task, walls)[1:]])
+        reached.append(len(corners) - 1)
+    _tighten(corners, reached[1:], places, task, walls)
     return float(np.hypot(*np.diff(corners, axis=0).T).sum())
+
+
+def _tighten(
+    corners: DoubleArray,
+    reached: Sequence[int],
+    places: Sequence[Place],
+    task: Task,
+    walls: list[PhysicsBody],
+) -> None:
+    """Moves the corners at which a path reaches places, until it becomes no shorter."""
+    for _ in range(_SWEEPS):
+        gain = 0.0
+        for index, (center, radius) in zip(reached, places, strict=True):
+            # A corner that reaches several places stays where it is.
+            if index == 0 or reached.count(index) > 1:
+                continue
+            before = corners[index - 1]
+            after = corners[index + 1] if index + 1 < len(corners) else None
+            ends = [before] if after is None else [before, after]
+            new, old = _entry(before, after, np.array(center), radius), corners[index].copy()
+            shorter = sum(math.dist(old, end) - math.dist(new, end) for end in ends)
+            if shorter > 0 and all(_is_free(end, new, task, walls) for end in ends):
+                corners[index] = new
+                gain += shorter
+        if gain < _LEAST_GAIN:
+            return
+
+
+def _entry(
+    before: DoubleArray, after: DoubleArray | None, center: DoubleArray, radius: float
+) -> DoubleArray:
+    """Returns the point of a circle by which the way from one point to another is shortest.
+
+    Args:
+        before: Start of the way [m].
+        after: End of the way [m]; None if the way ends in the circle.
+        center: Center of the circle [m].
+        radius: Its radius [m].
+    """
+    end = center if after is None else after
+    along = end - before
+    square = float(along @ along)
+    part = float((center - before) @ along) / square if square else 0.0
+    nearest: DoubleArray = before + min(max(part, 0.0), 1.0) * along
+    if after is None:
+        nearest = before
+    offset = nearest - center
+    if float(np.hypot(*offset)) <= radius:
+        return nearest
+    if after is None:
+        return np.asarray(center + offset * (radius / np.hypot(*offset)))
+    # The best point is on the arc between the directions to both ends.
+    low = math.atan2(*(before - center)[::-1])
+    high = low + math.remainder(math.atan2(*(after - center)[::-1]) - low, math.tau)
+
+    def point(angle: float) -> DoubleArray:
+        return center + radius * np.array([math.cos(angle), math.sin(angle)])
+
+    def length(angle: float) -> float:
+        return math.dist(before, point(angle)) + math.dist(point(angle), after)
+
+    for _ in range(_TRISECTIONS):
+        left, right = (2 * low + high) / 3, (low + 2 * high) / 3
+        if length(left) <= length(right):
+            high = right
+        else:
+            low = left
+    return point((low + high) / 2)
 
 
 def _no_path(start: Vector2, goal: Vector2) -> str:
@@ -113,12 +205,16 @@ class _Grid:
     """The points of a square grid over the walls of a world."""
 
     def __init__(
-        self, task: Task, start: Vector2, goal: Vector2, only: list[PhysicsBody] | None = None
+        self,
+        task: Task,
+        start: Vector2,
+        goals: Sequence[Vector2],
+        only: list[PhysicsBody] | None = None,
     ) -> None:
         self._task = task
         self._only = only
         ends = [layer.world_edges.reshape(-1, 2) for layer in task.world.layers]
-        corners = np.concatenate([*ends, [start, goal]])
+        corners = np.concatenate([*ends, [start, *goals]])
         x_min, y_min, x_max, y_max = bounds_of(corners) or (*start, *start)
         width, height = x_max - x_min, y_max - y_min
         self._spacing = max(_SPACING, math.sqrt(width * height / _MAX_POINTS))
@@ -145,15 +241,31 @@ class _Grid:
         return free.ravel()
 
     def search(
-        self, start: Vector2, goal: Vector2, free: BoolArray, preferred: BoolArray
+        self,
+        start: Vector2,
+        goal: Vector2,
+        free: BoolArray,
+        preferred: BoolArray,
+        radius: float = 0.0,
     ) -> DoubleArray | None:
         """Returns the cheapest path between the free points next to start and goal, shape (n, 2).
 
-        Returns None if there is no path.
+        Args:
+            start: Start of the path [m].
+            goal: End of the path [m].
+            free: The points that the path may contain, shape (n,).
+            preferred: Those without additional cost, shape (n,).
+            radius: Distance to the goal at which the path may end [m].
+
+        Returns:
+            The points; None if there is no path.
         """
         first, last = self._nearest(start, free), self._nearest(goal, free)
-        if first is None or last is None:
+        ends = self._within(goal, radius, free) or {last}
+        if first is None or ends == {None}:
             return None
+        if last is None:
+            last = min(end for end in ends if end is not None)
         columns, diagonal = self._columns, math.sqrt(2)
         steps = [(1, 1.0), (-1, 1.0), (columns, 1.0), (-columns, 1.0)]
         steps += [(row + column, diagonal) for row in (columns, -columns) for column in (1, -1)]
@@ -161,12 +273,14 @@ class _Grid:
         weights[~free] = math.inf
         weight_of = weights.tolist()
         goal_row, goal_column = divmod(last, columns)
+        # All ends are that close to the last point.
+        slack = _MOST_OCTILE * (2 * radius / self._spacing) if len(ends) > 1 else 0.0
         costs, previous, done = {first: 0.0}, {first: first}, set[int]()
         queue = [(0.0, first)]
         while queue:
             _, point = heapq.heappop(queue)
-            if point == last:
-                path: DoubleArray = self._points[_chain(previous, last)]
+            if point in ends:
+                path: DoubleArray = self._points[_chain(previous, point)]
                 return path
             if point in done:
                 continue
@@ -180,8 +294,16 @@ class _Grid:
                     height, width = abs(row - goal_row), abs(column - goal_column)
                     # The length without obstacles.
                     rest = max(height, width) + (diagonal - 1) * min(height, width)
+                    rest = max(rest - slack, 0.0)
                     heapq.heappush(queue, (cost + rest, neighbour))
         return None
+
+    def _within(self, point: Vector2, radius: float, free: BoolArray) -> set[int | None]:
+        """Returns the free points of the grid within a radius of a point, none for radius 0."""
+        if not radius:
+            return set()
+        distances = np.hypot(*(self._points - point).T)
+        return set(np.flatnonzero((distances <= radius) & free).tolist())
 
     def _nearest(self, point: Vector2, free: BoolArray) -> int | None:
         distances = np.hypot(*(self._points - point).T)

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Final
 
 from flatland.scenarios.columns import COLUMNS, FAULTS, Row
-from flatland.scenarios.comparison import Difference
+from flatland.scenarios.comparison import Change, Comparison
 from flatland.scenarios.episode import Result
+from flatland.scenarios.evidence import distinct, repetitions
 from flatland.scenarios.pictures import run_picture, strip_plot
 from flatland.scenarios.results import SuiteResults
 from flatland.scenarios.summary import MEANS, Estimate, Summary, summarize
@@ -49,11 +50,11 @@ class Report:
 
     Attributes:
         command: The command that was run, as a list of words.
-        comparisons: Differences by the title of the comparison.
+        comparisons: Comparisons by title.
     """
 
     command: Sequence[str] = ()
-    comparisons: Mapping[str, Sequence[Difference]] = field(default_factory=dict)
+    comparisons: Mapping[str, Comparison] = field(default_factory=dict)
 
 
 def write_report(results: SuiteResults, report: Report, path: Path) -> None:
@@ -62,7 +63,7 @@ def write_report(results: SuiteResults, report: Report, path: Path) -> None:
     runs = worst_first(results.results)
     body = [
         _heading(results, report),
-        _summary_section(summarize(results.rows)),
+        _summary_section(summarize(results.rows), results.rows),
         *(_comparison_section(*item) for item in report.comparisons.items()),
         _plots_section(results),
         _runs_section(results, runs, path.parent),
@@ -114,7 +115,7 @@ def _heading(results: SuiteResults, report: Report) -> str:
 # -- tables --------------------------------------------------------------------------------
 
 
-def _summary_section(summaries: Sequence[Summary]) -> str:
+def _summary_section(summaries: Sequence[Summary], rows: Sequence[Row]) -> str:
     head = ["scenarios", "controller", "runs", "errors", "passed", "success"]
     head += [_label(name) for name in MEANS]
     lines = []
@@ -127,22 +128,46 @@ def _summary_section(summaries: Sequence[Summary]) -> str:
         "Rates with 95 % Wilson intervals, means with 95 % bootstrap intervals. Times and paths "
         "are those of the runs that reached all goals."
     )
-    return f"<h2>Summary</h2>{_table(head, lines, 2)}<p>{note}</p>"
+    equal = repetitions(rows)
+    if equal:
+        note += " Equal runs count once in rates, means, intervals and comparisons."
+    listed = _list("Equal runs", map(str, equal))
+    return f"<h2>Summary</h2>{_table(head, lines, 2)}<p>{note}</p>{listed}"
 
 
-def _comparison_section(title: str, differences: Sequence[Difference]) -> str:
+def _comparison_section(title: str, comparison: Comparison) -> str:
     head = ["measure", "pairs", "before", "after", "p", "verdict"]
     lines = []
-    for one in differences:
+    for one in comparison.differences:
         verdict = f'<span class="{one.verdict}">{one.verdict}</span>' if one.verdict else ""
         cells = [_label(one.measure), str(one.pairs), f"{one.before:.4g}", f"{one.after:.4g}"]
         lines.append([*cells, f"{one.p_value:.3g}", verdict])
     note = (
-        "Pairs of runs of the same scenario and seed: the exact test of McNemar for rates, the "
-        "signed-rank test of Wilcoxon for other measures, adjusted by the method of Holm."
+        f"{comparison.pairs} pairs of runs of the same scenario and seed, {comparison.distinct} of "
+        "them distinct: the exact test of McNemar for rates, the signed-rank test of Wilcoxon for "
+        "other measures. The p-values are adjusted by the method of Holm, except for that of "
+        "passed, which is tested on its own."
     )
     body = _table(head, lines, 1) if lines else "<p>There are no runs in common.</p>"
-    return f"<h2>{escape(title)}</h2>{body}<p>{note}</p>"
+    lost = _changes("From pass to fail", comparison.lost)
+    gained = _changes("From fail to pass", comparison.gained)
+    return f"<h2>{escape(title)}</h2>{lost}{gained}{body}<p>{note}</p>"
+
+
+def _changes(title: str, changes: Sequence[Change]) -> str:
+    return _list(title, map(str, changes), is_open=True)
+
+
+def _list(title: str, items: Iterable[str], *, is_open: bool = False) -> str:
+    """Returns a list of texts that can be folded, with their number; empty without items."""
+    lines = [f"<li>{escape(item)}</li>" for item in items]
+    if not lines:
+        return ""
+    state = " open" if is_open else ""
+    return (
+        f"<details{state}><summary>{escape(title)}: {len(lines)}</summary>"
+        f"<ul>{''.join(lines)}</ul></details>"
+    )
 
 
 def _table(head: Sequence[str], lines: Iterable[Sequence[str]], texts: int) -> str:
@@ -176,28 +201,30 @@ def _rate(rate: Estimate) -> str:
 def _mean(mean: Estimate, digits: int) -> str:
     if math.isnan(mean.value):
         return "-"
-    return (
-        f"{mean.value:.{digits}f}<br><small>{mean.low:.{digits}f} to {mean.high:.{digits}f}</small>"
-    )
+    text = f"{mean.value:.{digits}f}"
+    if math.isnan(mean.low):
+        return text
+    return f"{text}<br><small>{mean.low:.{digits}f} to {mean.high:.{digits}f}</small>"
 
 
 # -- runs ----------------------------------------------------------------------------------
 
 
 def _plots_section(results: SuiteResults) -> str:
-    controllers = list(dict.fromkeys(row["controller"] for row in results.rows))
+    rows = distinct(results.rows)
+    controllers = list(dict.fromkeys(row["controller"] for row in rows))
     plots = []
     for name in _PLOTS:
         values = {
             controller: [
                 (f"{row['scenario']} seed {row['seed']}", float(row[name]))
-                for row in results.rows
+                for row in rows
                 if row["controller"] == controller and row[name] is not None
             ]
             for controller in controllers
         }
         plots.append(strip_plot(name.replace("_", " "), values, COLUMNS[name].unit))
-    note = "One dot for each run of a scenario and seed; the line is the mean."
+    note = "One dot for each distinct run of a scenario; the line is the mean."
     return f'<h2>All runs</h2><div class="plots">{"".join(plots)}</div><p>{note}</p>'
 
 

@@ -16,7 +16,9 @@ _BITS: Final = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 
 
 def sketch(result: Result, walls: Sequence[Line], columns: int = 76, rows: int = 24) -> str:
-    """Returns a drawing of a run: walls as lines, and the path as `•` from `S` to `X`; goals `G`.
+    """Returns a drawing of a run: walls and models as lines, the path as `•` from `S` to `X`.
+
+    Goals are `G`. Models are drawn at their poses at the end.
 
     Args:
         result: The run.
@@ -24,8 +26,12 @@ def sketch(result: Result, walls: Sequence[Line], columns: int = 76, rows: int =
         columns: Most characters of a line.
         rows: Most lines.
     """
-    path = [(x, y) for _, x, y in result.path]
+    tracks = result.tracks
+    path = [point for track in tracks for point in track]
+    models = [(role, line) for _, role, lines in result.models for line in lines]
     points = [point for line in walls for point in line] + path + list(result.goals)
+    # Models may have been put far away.
+    points += [point for role, line in models if role == "hit" or not walls for point in line]
     if not points:
         return ""
     x_min, x_max = min(x for x, _ in points), max(x for x, _ in points)
@@ -39,13 +45,19 @@ def sketch(result: Result, walls: Sequence[Line], columns: int = 76, rows: int =
 
     last_column, last_row = place((x_max, y_min))
     grid = [[" "] * (last_column // 2 + 1) for _ in range(last_row // 4 + 1)]
-    for line in walls:
+    seen = [
+        line
+        for role, line in models
+        if role != "robot" and all(x_min <= x <= x_max and y_min <= y <= y_max for x, y in line)
+    ]
+    for line in [*walls, *seen]:
         for x, y in _dots([place(point) for point in line]):
             old = grid[y // 4][x // 2]
             bits = ord(old) if old != " " else _BLANK
             grid[y // 4][x // 2] = chr(bits | _BITS[y % 4][x % 2])
-    for x, y in _dots([place(point) for point in path]):
-        grid[y // 4][x // 2] = "•"
+    for track in tracks:
+        for x, y in _dots([place(point) for point in track]):
+            grid[y // 4][x // 2] = "•"
     marks = [("G", goal) for goal in result.goals]
     marks += [("S", path[0]), ("X", path[-1])] if path else []
     for mark, point in marks:

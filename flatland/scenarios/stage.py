@@ -99,7 +99,7 @@ def prepare(world: World, run: Run) -> Stage:
         radius=radius,
         category_bits=bits,
         goals=places.goals(scenario, start),
-        period=wanted.period,
+        period=period_of(world, wanted),
         max_speed=wanted.max_speed,
         max_turn=wanted.max_turn,
         rng=generator(run.seed, "controller"),
@@ -111,6 +111,13 @@ def prepare(world: World, run: Run) -> Stage:
 def drive_topic(robot: Model, wanted: Robot) -> str:
     """Returns the topic of the command of a robot."""
     return "/".join(filter(None, (robot.namespace, wanted.cmd_vel)))
+
+
+def period_of(world: World, wanted: Robot) -> float:
+    """Returns the time between two commands [s]: a whole number of steps, at least one."""
+    step_size = world.timekeeper.step_size
+    period = max(1, round(wanted.period / step_size)) * step_size
+    return wanted.period if math.isclose(period, wanted.period) else period
 
 
 def generator(seed: int, purpose: str) -> np.random.Generator:

@@ -33,11 +33,11 @@ def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
 
 
 def bootstrap_interval(values: Sequence[float]) -> tuple[float, float]:
-    """Returns the 95 % percentile bootstrap interval of a mean; NaN without values.
+    """Returns the 95 % percentile bootstrap interval of a mean; NaN for fewer than two values.
 
     See B. Efron, "Bootstrap Methods: Another Look at the Jackknife", Annals of Statistics 7, 1979.
     """
-    if not len(values):
+    if len(values) < 2:  # They do not show how much the values differ.
         return (math.nan, math.nan)
     numbers = np.asarray(values, float)
     rng = np.random.default_rng(_BOOTSTRAP_SEED)

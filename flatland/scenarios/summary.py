@@ -8,17 +8,22 @@ from dataclasses import dataclass
 from typing import Final
 
 from flatland.scenarios.columns import FAULTS, Row
+from flatland.scenarios.evidence import distinct, repetitions
 from flatland.scenarios.statistics import bootstrap_interval, wilson_interval
 
 MEANS: Final = ("spl", "time", "path_length", "collisions", "clearance", "jerk", "command_time")
 """The measures of a summary; times and lengths are those of successes."""
 
 _OF_SUCCESSES: Final = ("time", "path_length")
+_MOST_NOTES: Final = 10  # scenarios with equal runs that are named below a table
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A rate or mean with its 95 % interval; NaN without runs."""
+    """A rate or mean with its 95 % interval; NaN without runs.
+
+    The interval of a mean is NaN for a single run.
+    """
 
     value: float
     low: float
@@ -34,9 +39,9 @@ class Summary:
         controller: The controller.
         runs: Number of runs.
         errors: Number of runs with an error.
-        passed: Share of runs that met all conditions.
-        success: Share of runs that reached all goals.
-        means: Means of `MEANS`, NaN for one without values.
+        passed: Share of the distinct runs that met all conditions.
+        success: Share of the distinct runs that reached all goals.
+        means: Means of `MEANS` of the distinct runs, NaN for one without values.
     """
 
     group: str
@@ -56,7 +61,8 @@ def group_of(row: Row) -> str:
 def summarize(rows: Iterable[Row]) -> list[Summary]:
     """Returns a summary for each scenario file and controller, and for all files together.
 
-    Runs with an error have neither passed nor succeeded.
+    Equal runs count once in rates, means and intervals. Runs with an error have neither passed nor
+    succeeded.
 
     Args:
         rows: The rows, in the order of the summaries.
@@ -75,12 +81,13 @@ def summarize(rows: Iterable[Row]) -> list[Summary]:
 
 
 def _summary(group: str, controller: str, rows: Sequence[Row]) -> Summary:
-    own = [row for row in rows if row["controller"] == controller]
+    made = [row for row in rows if row["controller"] == controller]
+    own = distinct(made)
     return Summary(
         group,
         controller,
-        len(own),
-        sum(row["outcome"] in FAULTS for row in own),
+        len(made),
+        sum(row["outcome"] in FAULTS for row in made),
         _rate([row["passed"] for row in own]),
         _rate([row["success"] for row in own]),
         {name: _mean(name, own) for name in MEANS},
@@ -100,6 +107,23 @@ def _mean(name: str, rows: Sequence[Row]) -> Estimate:
     ]
     mean = sum(values) / len(values) if values else math.nan
     return Estimate(mean, *bootstrap_interval(values))
+
+
+def repetition_notes(rows: Iterable[Row], most: int = _MOST_NOTES) -> list[str]:
+    """Returns the lines below a table about equal runs, none without equal runs.
+
+    Args:
+        rows: The rows.
+        most: Number of scenarios and controllers that are named.
+    """
+    found = repetitions(rows)
+    if not found:
+        return []
+    lines = ["equal runs count once in rates, means, intervals and comparisons:"]
+    lines += [f"  {one}" for one in found[:most]]
+    if len(found) > most:
+        lines.append(f"  and {len(found) - most} more, see the report")
+    return lines
 
 
 def summary_table(summaries: Sequence[Summary]) -> str:
@@ -147,4 +171,6 @@ def _shown(mean: Estimate, digits: int, interval: bool) -> str:
     if math.isnan(mean.value):
         return "-"
     text = f"{mean.value:.{digits}f}"
-    return f"{text} ({mean.low:.{digits}f}-{mean.high:.{digits}f})" if interval else text
+    if not interval or math.isnan(mean.low):
+        return text
+    return f"{text} ({mean.low:.{digits}f}-{mean.high:.{digits}f})"

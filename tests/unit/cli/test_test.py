@@ -26,11 +26,16 @@ ROBOT = """
     - {type: Laser, name: eye, body: base, range: 9, angle: {min: -3, max: 3, increment: 0.1}}
 """
 SLOW = """
+import math
+
 import flatland
 
 class Slow:
     def __init__(self, task): pass
-    def command(self, scan, pose, goal): return flatland.Twist(linear_x=0.3)
+    def command(self, scan, pose, goal):
+        bearing = math.atan2(goal[1] - pose[1], goal[0] - pose[0]) - pose[2]
+        turn = math.remainder(bearing, math.tau)
+        return flatland.Twist(linear_x=0.3 if abs(turn) < 0.5 else 0.0, angular_z=2 * turn)
 
 class Late(Slow):
     def command(self, scan, pose, goal):
@@ -101,11 +106,15 @@ def test_a_failed_run_is_drawn_and_can_be_replayed(suite, capsys):
 
 
 def test_a_baseline_decides_on_the_exit_code(suite, capsys):
+    # Each seed has another start.
+    (suite / "s.yaml").write_text(
+        (suite / "s.yaml").read_text() + "start: {area: [2, 4, 3.5, 6]}\n"
+    )
     run = ("test", "s.yaml", "--seeds", "0:12")
     assert main(*run, "--robot", "straight", "--out", "old") == 0
     baseline = ("--baseline", "old/results.json")
-    assert main("test", "s.yaml", "--robot", "straight", *baseline) == 0
-    assert "no significant difference" in capsys.readouterr().out
+    assert main(*run, "--robot", "straight", *baseline) == 0
+    assert "no significant difference of a measure in 12 distinct pairs" in capsys.readouterr().out
     # Slower, and within its limit.
     assert main(*run, "--robot", "own.py:Slow", *baseline, "--out", "slow") == 1
     output = capsys.readouterr().out
@@ -118,13 +127,33 @@ def test_a_baseline_decides_on_the_exit_code(suite, capsys):
     assert "energy is worse" in output
 
 
+def test_a_run_that_does_not_pass_any_more_fails_the_gate(suite, capsys):
+    assert main("test", "s.yaml", "--robot", "straight", "--out", "old") == 0
+    assert "s with straight: 3 seeds, 1 distinct trajectory" in capsys.readouterr().out
+    run = ("test", "s.yaml", "--baseline", "old", "--out", "new")
+    assert main(*run, "--robot", "own.py:Late") == 1
+    output = capsys.readouterr().out
+    assert "3 runs from pass to fail:" in output
+    assert "    s seed 2: reached within 12 s: the outcome is timeout" in output
+    assert " is worse" not in output  # It is one run.
+    assert "From pass to fail: 3" in (suite / "new" / "report.html").read_text()
+    assert main(*run, "--robot", "own.py:Late", "--regressions", "significant") == 0
+    capsys.readouterr()
+    # Back again, and a controller that the baseline does not have.
+    back = ("test", "s.yaml", "--baseline", "new", "--robot")
+    assert main(*back, "straight") == 0
+    assert "3 runs from fail to pass:" in capsys.readouterr().out
+    assert main(*back, "own.py:Late,straight") == 1
+    assert "straight against the baseline:\n  no runs in common" in capsys.readouterr().out
+
+
 def test_a_baseline_without_runs_in_common_is_not_passed(suite, capsys):
     assert main("test", "s.yaml", "--robot", "straight,gap", "--out", "old") == 0
     run = ("test", "s.yaml", "--baseline", "old")
     assert main(*run, "--robot", "straight", "--seeds", "7") == 1
     assert "no runs in common" in capsys.readouterr().out
     assert main(*run, "--robot", "own.py:Slow") == 1
-    assert "old: no runs of own.py:Slow" in capsys.readouterr().out
+    assert "own.py:Slow against the baseline:\n  no runs in common" in capsys.readouterr().out
 
 
 def test_errors_of_scenarios_are_printed_together(suite, capsys):

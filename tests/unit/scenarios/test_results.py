@@ -10,21 +10,27 @@ import xml.etree.ElementTree as ElementTree
 import pytest
 
 from flatland.scenarios.columns import COLUMNS, empty_row, error_row
-from flatland.scenarios.comparison import became_worse, compare
+from flatland.scenarios.comparison import compare
 from flatland.scenarios.episode import Result
 from flatland.scenarios.junit import write_junit
 from flatland.scenarios.outline import Outline
+from flatland.scenarios.pictures import run_picture
 from flatland.scenarios.report import Report, worst_first, write_report
 from flatland.scenarios.results import ResultsError, SuiteResults, read_results, write_results
 from flatland.scenarios.sketch import sketch
-from flatland.scenarios.summary import markdown_table, summarize, summary_table
+from flatland.scenarios.summary import (
+    markdown_table,
+    repetition_notes,
+    summarize,
+    summary_table,
+)
 
 SQUARE = [[(0.0, 0.0), (10.0, 0.0), (10.0, 5.0), (0.0, 5.0), (0.0, 0.0)]]
 
 
 def row(scenario="s/a", controller="gap", seed=0, **values):
     good = {"passed": True, "success": True, "outcome": "reached", "spl": 1.0, "time": 10.0}
-    good |= {"collisions": 0, "clearance": 0.5, "path_length": 5.0}
+    good |= {"collisions": 0, "clearance": 0.5, "path_length": 5.0, "trajectory": str(seed)}
     return empty_row((scenario, controller, seed)) | good | values
 
 
@@ -91,26 +97,27 @@ def test_junit(results, tmp_path):
 # -- comparisons ---------------------------------------------------------------------------
 
 
-def verdicts(differences):
-    return {one.measure: one.verdict for one in differences if one.verdict}
+def verdicts(comparison):
+    return {one.measure: one.verdict for one in comparison.differences if one.verdict}
 
 
 def test_equal_runs_do_not_differ():
     rows = [row(seed=seed, clearance=0.1 * seed) for seed in range(20)]
-    differences = compare(rows, rows)
-    assert {one.pairs for one in differences} == {20}
-    assert verdicts(differences) == {}
-    assert compare(rows, [row(scenario="other")]) == []
+    comparison = compare(rows, rows)
+    assert {one.pairs for one in comparison.differences} == {20}
+    assert verdicts(comparison) == {}
+    other = compare(rows, [row(scenario="other")])
+    assert (other.differences, other.pairs, other.only_before, other.only_after) == ([], 0, 20, 1)
 
 
 def test_what_became_worse_is_found():
     before = [row(seed=seed, time=10 + 0.1 * seed) for seed in range(20)]
     after = [row(seed=seed, time=9 + 0.1 * seed, clearance=0.4) for seed in range(20)]
-    differences = compare(before, after)
-    assert verdicts(differences) == {"time": "better", "clearance": "worse"}
-    assert became_worse(differences) == ["clearance"]
-    assert became_worse(compare(after, before)) == ["time"]
-    found = {one.measure: one for one in differences}
+    comparison = compare(before, after)
+    assert verdicts(comparison) == {"time": "better", "clearance": "worse"}
+    assert comparison.worse == ["clearance"]
+    assert compare(after, before).worse == ["time"]
+    found = {one.measure: one for one in comparison.differences}
     assert found["time"].before - found["time"].after == pytest.approx(1.0)
 
 
@@ -124,17 +131,67 @@ def test_differences_of_at_most_one_percent_do_not_matter():
 def test_rates_are_compared_in_pairs():
     before = [row(seed=seed) for seed in range(12)]
     after = [row(seed=seed, **(FAILED if seed < 10 else {})) for seed in range(12)]
-    worse = became_worse(compare(before, after))
-    assert {"passed", "success", "spl", "collisions"} <= set(worse)
+    comparison = compare(before, after)
+    assert {"passed", "success", "spl", "collisions"} <= set(comparison.worse)
     # The times of runs without success are no times of the way.
-    (time,) = [one for one in compare(before, after) if one.measure == "time"]
+    (time,) = [one for one in comparison.differences if one.measure == "time"]
     assert time.pairs == 2
 
 
 def test_few_runs_are_not_significant():
     before = [row(seed=seed) for seed in range(4)]
     after = [row(seed=seed, **FAILED) for seed in range(4)]
-    assert became_worse(compare(before, after)) == []
+    comparison = compare(before, after)
+    assert comparison.worse == []
+    # The runs themselves are listed.
+    assert [str(one) for one in comparison.lost] == [
+        f"s/a seed {seed}: collision" for seed in range(4)
+    ]
+
+
+def test_passed_is_tested_on_its_own():
+    before = [row(seed=seed) for seed in range(17)]
+    after = [row(seed=seed, passed=seed >= 8, failures="no contact") for seed in range(17)]
+    comparison = compare(before, after)
+    (passed,) = [one for one in comparison.differences if one.measure == "passed"]
+    # 8 of 8 pairs that differ became worse, without a correction for other measures.
+    assert passed.p_value == 2 / 2**8
+    assert comparison.worse == ["passed"]
+    assert (len(comparison.lost), comparison.gained) == (8, [])
+    back = compare(after, before)
+    assert (back.worse, len(back.gained), back.lost) == ([], 8, [])
+    assert str(back.gained[0]) == "s/a seed 0: no contact"
+
+
+def test_equal_runs_are_one_run():
+    before = [row(seed=seed, trajectory="a") for seed in range(20)]
+    after = [row(seed=seed, trajectory="b", time=5.0) for seed in range(20)]
+    comparison = compare(before, after)
+    assert (comparison.pairs, comparison.distinct) == (20, 1)
+    assert verdicts(comparison) == {}
+    assert {one.pairs for one in comparison.differences} == {1}
+    # Equal trajectories among other people are other runs.
+    for seed, one in enumerate(after):
+        one["people_distance"] = 1.0 + seed
+    assert verdicts(compare(before, after)) == {"time": "better"}
+    # So are those in other scenarios.
+    other = [one | {"scenario": f"s/{seed}"} for seed, one in enumerate(before)]
+    assert compare(other, other).distinct == 20
+
+
+def test_equal_runs_count_once_in_a_summary():
+    rows = [row(seed=seed, trajectory="a") for seed in range(20)]
+    rows += [row("s/b", seed=seed, **FAILED) for seed in range(3)]
+    (summary,) = summarize(rows)
+    assert (summary.runs, summary.passed.value) == (23, 1 / 4)
+    assert summary.passed.high < 0.75
+    notes = repetition_notes(rows)
+    assert notes[1:] == ["  s/a with gap: 20 seeds, 1 distinct trajectory"]
+    assert repetition_notes(rows[19:]) == []
+    # The mean of a single run has no interval.
+    (one,) = summarize(rows[:20])
+    assert math.isnan(one.means["time"].low)
+    assert "10.0 (" not in summary_table([one])
 
 
 # -- tables --------------------------------------------------------------------------------
@@ -196,7 +253,8 @@ class Page(html.parser.HTMLParser):
 
 
 def test_the_report_is_one_file(results, tmp_path):
-    comparison = compare([row(seed=s) for s in range(9)], [row(seed=s, time=12) for s in range(9)])
+    after = [row(seed=s, time=12) for s in range(8)] + [row(seed=8, **FAILED)]
+    comparison = compare([row(seed=s) for s in range(9)], after)
     report = Report(["flatland", "test", "a b"], {"gap against the baseline": comparison})
     write_report(results, report, tmp_path / "report.html")
     page = Page((tmp_path / "report.html").read_text().replace("<!DOCTYPE html>", ""))
@@ -212,6 +270,7 @@ def test_the_report_is_one_file(results, tmp_path):
     assert f"flatland replay {tmp_path} --view shows this report" in page.texts
     assert "kidnap at 0.50 s" in page.texts
     assert "worse" in page.texts
+    assert "From pass to fail: 1s/a seed 8: collision" in page.texts
     first = page.texts.index("no <way>")
     assert first < page.texts.index("Replay")
 
@@ -222,6 +281,34 @@ def test_a_report_of_errors_only_can_be_written(tmp_path):
     results.missing = 3
     write_report(results, Report(), tmp_path / "report.html")
     assert "3 missing, because the suite was interrupted" in (tmp_path / "report.html").read_text()
+
+
+def test_pictures_show_models_at_the_end_and_jumps():
+    path = [(0.0, 1.0, 1.0), (1.0, 2.0, 1.0), (2.0, 6.0, 3.0), (3.0, 7.0, 3.0)]
+    result = Result(row(), path, [(9.0, 3.0)])
+    result.jumps = [(1.5, 2.5, 1.0, 5.5, 3.0)]
+    box = [[(7.2, 2.8), (7.6, 2.8), (7.6, 3.2), (7.2, 2.8)]]
+    far = [[(900.0, 0.0), (901.0, 0.0), (900.0, 0.0)]]
+    result.models = [("box <1>", "hit", box), ("gone", "model", far)]
+    assert result.tracks == [
+        [(1.0, 1.0), (2.0, 1.0), (2.5, 1.0)],
+        [(5.5, 3.0), (6.0, 3.0), (7.0, 3.0)],
+    ]
+    page = Page(run_picture(result, SQUARE))
+    paths = {a["class"]: a["d"] for tag, a in page.elements if tag == "path"}
+    assert paths["track"].count("M") == 2
+    assert paths["jump"].count("L") == 1
+    assert "box <1>, hit by the robot" in page.texts
+    assert "model hit" in paths
+    # The picture is as wide as the walls.
+    (svg,) = [a for tag, a in page.elements if tag == "svg"]
+    assert svg["width"] == "360"
+    lines = sketch(result, SQUARE, columns=40, rows=12).splitlines()
+    assert max(map(len, lines)) <= 40
+    # The box is to the right of the end, and nothing is drawn along the jump.
+    end = next(line for line in lines if "X" in line)
+    assert end[end.index("X") + 1 :].strip("⡇⢸ ")
+    assert sum("•" in line for line in lines) <= 2
 
 
 def test_sketches_have_the_shape_of_the_world(results):
