@@ -103,9 +103,16 @@ format: setup-dev  ## format Python, C++ and JavaScript sources
 	$(BIOME) --write $(JS_FILES)
 
 .PHONY: bench
-bench: setup-dev  ## measure performance, write build/bench.json and .png: make bench [BASELINE=earlier.json]
-	@. ./setup.bash && python bench --json build/bench.json --plot build/bench.png \
-	  $(if $(BASELINE),--baseline "$(BASELINE)") $(ARGS)
+bench: setup-dev  ## measure performance, write build/bench.json and .png: make bench [ARGS="--only node"]
+	@. ./setup.bash && python bench --json build/bench.json --plot build/bench.png $(ARGS)
+
+.PHONY: bench-against
+bench-against: setup-dev  ## compare with another commit, by turns: make bench-against REF=main [ARGS="--only office"]
+	@. ./setup.bash && python bench/against.py "$(REF)" $(ARGS)
+
+.PHONY: bench-calls
+bench-calls: setup-dev  ## count the Python calls of a step, a spawn, a clone, a restore and a reset
+	@. ./setup.bash && python bench/calls.py $(ARGS)
 
 .PHONY: soak
 soak: setup-dev  ## run for a long time and check that nothing grows: make soak [ARGS="office --scale 0.1"]

@@ -50,9 +50,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="bench", description=__doc__)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all results as JSON")
     parser.add_argument(
-        "--baseline", type=Path, metavar="FILE", help="compare with the JSON file of an earlier run"
-    )
-    parser.add_argument(
         "--plot", type=Path, metavar="FILE", help="plot the cost over the problem size"
     )
     groups = (*MODULES, GROWTH)
@@ -65,10 +62,6 @@ def main() -> None:
         help=f"measure only these groups: {', '.join(groups)}",
     )
     options = parser.parse_args()
-    baseline = {}
-    if options.baseline is not None:
-        earlier = json.loads(options.baseline.read_text())
-        baseline = {row["name"]: row["value"] for row in earlier["rows"]}
     unit = time_unit()
     world = benchmark_world_path().parent.name
     print(f"U = {unit * 1e3:.3f} ms, in {world}\n")
@@ -78,7 +71,7 @@ def main() -> None:
     for name in MODULES:
         if name in options.only:
             rows += importlib.import_module(name).rows(unit)
-    print(format_table(rows, baseline))
+    print(format_table(rows))
     panels = []
     if GROWTH in options.only and (options.json is not None or options.plot is not None):
         panels = importlib.import_module(GROWTH).panels()

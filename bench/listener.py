@@ -1,6 +1,7 @@
 """A node that subscribes to topics: python listener.py [--drive TOPIC] topic:package/Type...
 
-With --drive, it publishes a velocity command, so that a robot drives in a circle.
+With --drive, it publishes a velocity command, so that a robot drives in a circle, and prints
+`driving` as soon as the robot is connected.
 
 Prints `ready` after all subscriptions, then the arrival time of the first message of each topic on
 the monotonic clock [s], `running` with that of the first /clock after 0, and at exit the number of
@@ -35,6 +36,13 @@ def count_message(message: Any, topic: str) -> None:
         print(f"running {time.monotonic()}", flush=True)
 
 
+def report_connection(publisher: rospy.Publisher) -> None:
+    """Prints a line when a publisher has a subscriber."""
+    while not publisher.get_num_connections():
+        time.sleep(0.05)
+    print("driving", flush=True)
+
+
 def main() -> None:
     """Counts messages until SIGINT."""
     stopped = threading.Event()
@@ -44,6 +52,7 @@ def main() -> None:
     if arguments[0] == "--drive":
         driver = rospy.Publisher(arguments[1], Twist, queue_size=1, latch=True)
         driver.publish(CIRCLE)
+        threading.Thread(target=report_connection, args=(driver,), daemon=True).start()
         arguments = arguments[2:]
     for argument in arguments:
         topic, message_type = argument.split(":")

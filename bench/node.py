@@ -50,9 +50,9 @@ plugins:
 def rows(unit: float) -> list[Row]:
     """Measures the node in the benchmark world."""
     world = benchmark_world_path()
-    with ros_session() as session, _quiet(world) as quiet_world:
+    with ros_session() as session, quiet(world) as quiet_world:
         laser = speed(session, world)
-        quiet = speed(session, quiet_world)
+        unwanted = speed(session, quiet_world)
         subscribed = speed(session, world, CLOCK, SCAN, ODOMETRY)
         four = speed(session, world, SCAN, TF, ODOMETRY, TWIST)
         markers = _markers(world)
@@ -69,7 +69,7 @@ def rows(unit: float) -> list[Row]:
         spawn = _spawn(session, quiet_world)
     return [
         _step_row("step of the node, laser computed, no subscribers", laser, unit, 0.03),
-        _step_row("step of the node, laser not wanted", quiet, unit, 0.009),
+        _step_row("step of the node, laser not wanted", unwanted, unit, 0.009),
         _step_row("step of the node, /scan, /odometry, /clock subscribed", subscribed, unit, 0.06),
         _step_row("step of the node, /scan, /tf, /odometry, /twist subscribed", four, unit, 0.05),
         _step_row("step of the node, all markers and handles subscribed", displayed, unit, 0.0115),
@@ -88,7 +88,7 @@ def _step_row(name: str, step: Mean, unit: float, bar: float) -> Row:
 
 
 @contextmanager
-def _quiet(world_path: Path) -> Iterator[Path]:
+def quiet(world_path: Path) -> Iterator[Path]:
     """Copies a world, without the `always_publish` of its plugins, and yields the path."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

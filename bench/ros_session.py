@@ -127,10 +127,15 @@ class RosSession:
 
 
 @contextlib.contextmanager
-def ros_session() -> Iterator[RosSession]:
-    """Runs a ROS master; stops it and all programs at the end."""
+def ros_session(variables: Mapping[str, str] | None = None) -> Iterator[RosSession]:
+    """Runs a ROS master; stops it and all programs at the end.
+
+    Args:
+        variables: Environment variables of the programs, in addition to those of a session; for
+            another version of flatland.
+    """
     with tempfile.TemporaryDirectory() as folder:
-        session = RosSession(_environment(Path(folder)))
+        session = RosSession({**_environment(Path(folder)), **(variables or {})})
         try:
             port = session.environment["ROS_MASTER_URI"].rsplit(":", 1)[1]
             session.start("roscore", "-p", port).wait_for("started core service")

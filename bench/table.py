@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ class Row:
     """The result of one measurement.
 
     Attributes:
-        name: Name of the measurement, also the key of the comparison with a baseline.
+        name: Name of the measurement.
         value: Measured value.
         unit: Unit of the value; `U` is the time of one scan of 1081 beams with
             `b2World::RayCast`, measured in the same run.
@@ -45,18 +45,12 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.4g}"
 
 
-def format_table(rows: Iterable[Row], baseline: Mapping[str, float]) -> str:
-    """Returns rows as a text table.
-
-    Args:
-        rows: The rows.
-        baseline: Values of an earlier run by row name; empty for a table without comparison.
-    """
-    lines = [("", "value", "bar", "value/bar", "", "value/baseline", "")]
+def format_table(rows: Iterable[Row]) -> str:
+    """Returns rows as a text table."""
+    lines = [("", "value", "bar", "value/bar", "", "")]
     for row in rows:
         verdict = {True: "met", False: "MISSED", None: ""}[row.met]
         sign = "" if row.bar is None else ("≥ " if row.at_least else "≤ ")
-        before = baseline.get(row.name)
         lines.append(
             (
                 row.name,
@@ -64,17 +58,18 @@ def format_table(rows: Iterable[Row], baseline: Mapping[str, float]) -> str:
                 f"{sign}{_number(row.bar)}",
                 _number(row.ratio),
                 verdict,
-                "" if not before else f"{row.value / before:.3f}",
                 row.note,
             )
         )
-    if not baseline:
-        lines = [line[:5] + line[6:] for line in lines]
+    return "\n".join(aligned(lines))
+
+
+def aligned(lines: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yields lines whose cells are padded to the widths of their columns."""
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
-        for line in lines
-    )
+    for line in lines:
+        cells = (cell.ljust(width) for cell, width in zip(line, widths, strict=True))
+        yield "  ".join(cells).rstrip()
 
 
 def as_json(rows: Iterable[Row]) -> list[dict[str, Any]]:
