@@ -12,6 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from flatland.checks import plain_numbers, shown
+
 Pose = tuple[float, float, float]
 Vector2 = tuple[float, float]
 Bounds = tuple[float, float, float, float]
@@ -66,13 +68,29 @@ def finite_pose(pose: Sequence[float]) -> Pose:
     Raises:
         ValueError: The sequence does not consist of three numbers, or one is NaN or infinite.
     """
-    try:
-        x, y, theta = (float(number) for number in pose)
-    except (TypeError, ValueError):
-        raise ValueError(f"pose must be three numbers (x, y, theta), got {pose!r}") from None
+    numbers = plain_numbers(pose, (3,))
+    if numbers is None:
+        raise ValueError(f"pose must be three numbers (x, y, theta), got {shown(pose)}")
+    x, y, theta = numbers
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(theta)):
         raise ValueError(f"pose must be finite, got ({x}, {y}, {theta})")
     return (x, y, theta)
+
+
+def finite_place(name: str, place: Sequence[float]) -> Vector2:
+    """Converts a sequence of two numbers to a place.
+
+    Args:
+        name: Name of the place, for the error.
+        place: The numbers.
+
+    Raises:
+        ValueError: The sequence does not consist of two numbers, or one is NaN or infinite.
+    """
+    numbers = plain_numbers(place, (2,))
+    if numbers is None or not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{name} must be two finite numbers (x, y), got {shown(place)}")
+    return (numbers[0], numbers[1])
 
 
 def transform_points(pose: Sequence[float], points: DoubleArray) -> DoubleArray:

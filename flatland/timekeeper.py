@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from flatland.checks import checked_range
+
 NANOSECONDS = 1_000_000_000
 
 MIN_STEP_SIZE = 1e-6
@@ -51,10 +53,7 @@ class Timekeeper:
         Raises:
             ValueError: The step size is out of range or NaN.
         """
-        if not MIN_STEP_SIZE <= step_size <= MAX_STEP_SIZE:
-            raise ValueError(
-                f"step_size must be from {MIN_STEP_SIZE:g} to {MAX_STEP_SIZE:g} s, got {step_size}"
-            )
+        step_size = checked_range("step_size", step_size, MIN_STEP_SIZE, MAX_STEP_SIZE, "s")
         self.step_size_ns = round(step_size * NANOSECONDS)
         self.step_size = self.step_size_ns / NANOSECONDS
         self._time = _OwnTime() if time is None else time

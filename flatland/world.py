@@ -12,6 +12,13 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from flatland.checks import (
+    check_function,
+    check_kind,
+    checked_count,
+    checked_number,
+    checked_path,
+)
 from flatland.config.inputs import Params
 from flatland.defaults import WEB_HOST
 from flatland.entities.collision_filter import CollisionFilter
@@ -19,7 +26,7 @@ from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import WorldError
 from flatland.loading.model_source import ModelSources, ModelSpec
-from flatland.loading.world_loader import load_world, reload_world
+from flatland.loading.world_loader import MAX_ITERATIONS, load_world, reload_world
 from flatland.loading.world_source import WorldSource
 from flatland.physics import PhysicsWorld
 from flatland.plugin_api.noise import checked_seed
@@ -38,9 +45,10 @@ from flatland.runtime.randomization import randomize_plugins
 from flatland.runtime.requests import Requests
 from flatland.runtime.snapshot import Snapshots, WorldSnapshot
 from flatland.runtime.state_hash import state_hash
-from flatland.runtime.stepping import Stepping
+from flatland.runtime.stepping import MAX_STEPS, Stepping
 from flatland.runtime.transforms import TransformBuffer
 from flatland.timekeeper import Timekeeper
+from flatland.uncopied import uncopied
 from flatland.values import OccupancyGrid
 
 if TYPE_CHECKING:
@@ -59,6 +67,7 @@ _LOG = logging.getLogger("flatland")
 R = TypeVar("R")
 
 
+@uncopied("World.clone() returns an independent copy, World.snapshot() a state for World.restore()")
 class World:
     """A simulated world; created by `World.from_yaml`.
 
@@ -109,12 +118,15 @@ class World:
         Raises:
             ValueError: An argument is out of range.
         """
-        if plugin_timeout is not None and not plugin_timeout > 0:
-            raise ValueError(f"plugin_timeout must be positive [s] or None, got {plugin_timeout}")
+        if plugin_timeout is not None:
+            plugin_timeout = checked_number("plugin_timeout", plugin_timeout, "s")
+            if not plugin_timeout > 0:
+                text = f"plugin_timeout must be positive [s] or None, got {plugin_timeout}"
+                raise ValueError(text)
         self.source = WorldSource() if source is None else source
         self.seed = checked_seed(seed)
-        self._velocity_iterations = velocity_iterations
-        self._position_iterations = position_iterations
+        self._velocity_iterations = _checked_iterations("velocity", velocity_iterations)
+        self._position_iterations = _checked_iterations("position", position_iterations)
         self.plugin_errors, self.on_invalid_body = plugin_errors, on_invalid_body
         self._paused = False
         self._closed = False
@@ -309,7 +321,7 @@ class World:
 
     @velocity_iterations.setter
     def velocity_iterations(self, count: int) -> None:
-        self._velocity_iterations = count
+        self._velocity_iterations = _checked_iterations("velocity", count)
         self.physics.jobs.interrupt()
 
     @property
@@ -319,16 +331,23 @@ class World:
 
     @position_iterations.setter
     def position_iterations(self, count: int) -> None:
-        self._position_iterations = count
+        self._position_iterations = _checked_iterations("position", count)
         self.physics.jobs.interrupt()
 
     def step(self, n: int = 1, *, while_paused: bool = False) -> None:
         """Steps `n` times; has no effect on a paused world unless `while_paused` is true.
 
+        Args:
+            n: Number of steps, at least 0.
+            while_paused: Whether a paused world is stepped as well.
+
         Raises:
+            ValueError: `n` is no integer, or out of range.
             WorldError: The world is closed, a plugin calls this, or a body is not finite.
             Exception: Raised by a plugin, subscriber or observer, with `plugin_errors="raise"`.
         """
+        if type(n) is not int or not 0 <= n <= MAX_STEPS:
+            n = checked_count("n", n, 0, MAX_STEPS)
         self.stepping.step(n, while_paused=while_paused)
 
     @property
@@ -758,6 +777,7 @@ class World:
 
     def post(self, action: Callable[[], R]) -> Future[R]:
         """Queues an action that runs between two steps; see `Requests.post`."""
+        check_function("action", action)
         return self.requests.post(action)
 
     def between_steps(self, action: Callable[[], R]) -> R:
@@ -765,10 +785,12 @@ class World:
 
         Safe from any thread; in a plugin's hook it runs at once.
         """
+        check_function("action", action)
         return self.requests.run(action)
 
     def add_observer(self, observer: WorldObserver) -> None:
         """Notifies an observer of all events from now on."""
+        check_kind("observer", observer, WorldObserver, "a WorldObserver")
         observer.attached(self)
         self._observers.add(observer)
         self.physics.jobs.interrupt()
@@ -840,6 +862,8 @@ class World:
                 cannot be copied; see *Snapshots* in `docs/write_a_plugin.md`.
             ValueError: The bodies of this world differ from those of `original`.
         """
+        if original is not None:
+            check_kind("original", original, WorldSnapshot, "a WorldSnapshot or None")
         return self._changes.save_or_restore(
             "snapshot", lambda: self._snapshots.taken, lambda: self._snapshots.take(original)
         )
@@ -858,6 +882,7 @@ class World:
             WorldError: The world is closed, a plugin calls this, the snapshot is one of another
                 world, or a plugin that a deletion or a reset has ended since had a connection.
         """
+        check_kind("snapshot", snapshot, WorldSnapshot, "a WorldSnapshot")
         self._changes.save_or_restore(
             "restore", lambda: snapshot.number, lambda: self._snapshots.restore(snapshot)
         )
@@ -877,9 +902,9 @@ class World:
         Raises:
             WorldError: The world is closed, or there are too few free places for people; other
                 plugins may have drawn already.
-            ValueError: The seed is negative.
+            ValueError: The seed is no integer, or negative.
         """
-        checked_seed(seed)
+        seed = checked_count("seed", seed, 0)
 
         def randomize() -> None:
             randomize_plugins(self.models, self.plugins, np.random.default_rng(seed))
@@ -921,10 +946,10 @@ class World:
             WorldError: The world is closed or was not loaded from a file.
             FlatlandError: With this seed, a file is invalid, or a plugin fails; the world is as
                 before, or empty if a plugin cannot be copied (see `snapshot`).
-            ValueError: The seed is negative.
+            ValueError: The seed is no integer, or negative.
         """
         if seed is not None:
-            checked_seed(seed)
+            seed = checked_seed(seed)
         arguments = {"seed": seed, "keep_time": keep_time}
         self._changes.make("reset", arguments, lambda: self._reset(seed, keep_time))
 
@@ -992,7 +1017,7 @@ class World:
         """
         from flatland.recording import Recorder  # Late: the simulation does not depend on it.
 
-        recorder = Recorder(self, path)
+        recorder = Recorder(self, checked_path("path", path))
         self.log_changes(recorder)
         self.add_observer(recorder)
         return recorder
@@ -1124,6 +1149,10 @@ class OpenView(Protocol):
 
     def __exit__(self, *error: object) -> None:
         """Closes the view."""
+
+
+def _checked_iterations(kind: str, count: int) -> int:
+    return checked_count(f"{kind}_iterations", count, 0, MAX_ITERATIONS)
 
 
 class _Settings:

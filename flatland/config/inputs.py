@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeVar, cast
 
+from flatland.checks import plain_path, shown
 from flatland.config.files import read_regular
 from flatland.errors import FlatlandError, Place
 
@@ -94,6 +95,11 @@ class Inputs:
         self._is_loading = False
         self._loaded = FileStore()  # what was read when the world file was loaded
         self._ahead: FileStore | None = None
+
+    @property
+    def is_loading(self) -> bool:
+        """Whether the world file is being loaded."""
+        return self._is_loading
 
     def copy(self) -> Inputs:
         """Returns an independent copy, which shares the contents of files."""
@@ -298,9 +304,9 @@ def real_folders(folders: Iterable[str | os.PathLike[str]] | None) -> tuple[str,
     """
     if folders is None:
         return None
-    if isinstance(folders, str | os.PathLike):
-        raise ValueError(f"model_path must be a list of folders, got {os.fspath(folders)!r}")
-    paths = [Path(folder).expanduser() for folder in folders]
+    if isinstance(folders, str | os.PathLike) or not isinstance(folders, Iterable):
+        raise ValueError(f"model_path must be a list of folders, got {shown(folders)}")
+    paths = [Path(plain_path("a folder of model_path", each)).expanduser() for each in folders]
     if not paths:
         raise ValueError("model_path must contain at least one folder")
     for path in paths:

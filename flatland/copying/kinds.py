@@ -34,6 +34,7 @@ import numpy as np
 from flatland.config.node import Source
 from flatland.config.reader import YamlReader
 from flatland.physics import Handle, PhysicsWorld
+from flatland.uncopied import refuse_copy
 
 MISSING: Final = object()
 """Value of a slot or a cell that is not set."""
@@ -664,8 +665,10 @@ def _has_only_attributes(obj: object) -> bool:
     cls = type(obj)
     if issubclass(cls, dict | list | set | collections.deque):
         return True
-    if any(hasattr(cls, name) for name in ("__deepcopy__", "__copy__")) or any(
-        getattr(cls, name) is not vars(object)[name] for name in ("__reduce__", "__reduce_ex__")
+    if (
+        any(hasattr(cls, name) for name in ("__deepcopy__", "__copy__"))
+        or cls.__reduce__ is not vars(object)["__reduce__"]
+        or cls.__reduce_ex__ not in (vars(object)["__reduce_ex__"], refuse_copy)
     ):
         return False
     try:

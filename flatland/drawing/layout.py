@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from flatland.checks import plain_numbers, shown
 from flatland.drawing.footprints import scene_bounds
 from flatland.geometry import Bounds
 from flatland.scene.world_scene import Scene
@@ -98,20 +99,19 @@ def checked_view(view: Sequence[float]) -> Bounds:
     Raises:
         ValueError: The view does not consist of four numbers, or they are out of range.
     """
-    try:
-        x_min, y_min, x_max, y_max = (float(number) for number in view)
-    except (TypeError, ValueError):
+    numbers = plain_numbers(view, (4,))
+    if numbers is None:
         raise ValueError(
-            f"view must be four numbers (x_min, y_min, x_max, y_max), got {view!r}"
-        ) from None
-    numbers = (x_min, y_min, x_max, y_max)
+            f"view must be four numbers (x_min, y_min, x_max, y_max), got {shown(view)}"
+        )
+    x_min, y_min, x_max, y_max = numbers
     in_range = all(abs(number) <= _MAX_COORDINATE for number in numbers)  # False for NaN
     if not (in_range and x_max - x_min >= _MIN_VIEW and y_max - y_min >= _MIN_VIEW):
         raise ValueError(
             f"view must be within +-{_MAX_COORDINATE:g} m, with x_min < x_max and y_min < y_max, "
             f"at least {_MIN_VIEW:g} m apart, got {numbers}"
         )
-    return numbers
+    return (x_min, y_min, x_max, y_max)
 
 
 def _label_length(low: float, high: float) -> int:
@@ -122,13 +122,11 @@ def _label_length(low: float, high: float) -> int:
 
 
 def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
-    try:
-        columns, rows = size
-        whole = (int(columns), int(rows))
-    except (TypeError, ValueError):
-        raise ValueError(f"size must be (width, height) in pixels, got {size!r}") from None
-    if whole != (columns, rows) or not all(1 <= side <= _MAX_SIDE for side in whole):
+    sides = plain_numbers(size, (2,))
+    if sides is None:
+        raise ValueError(f"size must be (width, height) in pixels, got {shown(size)}")
+    if not all(side.is_integer() and 1 <= side <= _MAX_SIDE for side in sides):
         raise ValueError(
-            f"size must be whole numbers of pixels from 1 to {_MAX_SIDE}, got {size!r}"
+            f"size must be whole numbers of pixels from 1 to {_MAX_SIDE}, got {shown(size)}"
         )
-    return whole
+    return (int(sides[0]), int(sides[1]))

@@ -6,7 +6,6 @@ matplotlib is imported when the first image is drawn. Its global state (pyplot) 
 from __future__ import annotations
 
 import io
-import math
 import os
 import threading
 from collections.abc import Iterable, Sequence
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, TypedDict, Unpack
 import numpy as np
 import numpy.typing as npt
 
+from flatland.checks import checked_names, checked_path, checked_range
 from flatland.drawing.layout import Layout, checked_view, default_view
 from flatland.errors import FlatlandError
 from flatland.extras import missing
@@ -72,7 +72,7 @@ class Picture:
         if isinstance(self.layers, str):
             raise ValueError(f"layers must be a list of names, got {self.layers!r}")
         if self.layers is not None:
-            self.layers = list(self.layers)
+            self.layers = checked_names("layers", self.layers)
 
 
 def draw(
@@ -152,7 +152,7 @@ def save(
         OSError: The file cannot be written.
         ValueError: The extension is unknown, or `size`, `dpi`, `view` or `layers` is invalid.
     """
-    suffix = Path(path).suffix.lower()
+    suffix = Path(checked_path("path", path)).suffix.lower()
     if suffix not in PICTURE_FORMATS:
         raise ValueError(f"path must end with one of {', '.join(PICTURE_FORMATS)}, got {path!r}")
     figure = make_figure(world, **options)
@@ -175,9 +175,7 @@ def lay_out(world: World, picture: Picture) -> tuple[Scene, Layout]:
         ValueError: `size`, `dpi`, `view` or `layers` is invalid.
     """
     check_matplotlib()
-    dpi, view = picture.dpi, picture.view
-    if not (math.isfinite(dpi) and 10 <= dpi <= 2400):
-        raise ValueError(f"dpi must be from 10 to 2400, got {dpi}")
+    dpi, view = checked_range("dpi", picture.dpi, 10, 2400), picture.view
     bounds = None if view is None else checked_view(view)
     scene = world.between_steps(lambda: describe_world(world, picture.layers, picture.scans))
     return scene, Layout.make(picture.size, dpi, bounds or default_view(scene), picture.axes)

@@ -10,6 +10,7 @@ import numpy as np
 from flatland.entities.body import Body, Color, Entity
 from flatland.geometry import DoubleArray, FloatArray, Pose, transform_points
 from flatland.physics import Material, PhysicsWorld
+from flatland.uncopied import uncopied
 
 if TYPE_CHECKING:
     from flatland.values import OccupancyGrid
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 WALL_FRICTION = 0.2  # default of Box2D fixtures
 
 
+@uncopied("World.clone() copies a world with its layers")
 class Layer(Entity):
     """Static geometry with one or several names, each of which has a category bit.
 

@@ -10,6 +10,7 @@ from flatland.entities.joint import Joint
 from flatland.errors import FlatlandError, WorldError
 from flatland.geometry import IDENTITY, MAX_MAGNITUDE, Pose, Vector2, compose, finite_pose, invert
 from flatland.graph_names import clean_name
+from flatland.uncopied import uncopied
 
 if TYPE_CHECKING:
     from flatland.physics import Touches
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from flatland.plugin_api.plugin_world import PluginWorld
 
 
+@uncopied("World.clone() copies a world with its models, World.spawn_model() adds another model")
 class Model(Entity):
     """A set of bodies with the joints and plugins attached to them.
 

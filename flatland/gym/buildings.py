@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flatland import worldgen
-from flatland.gym.checks import checked_count
+from flatland.checks import checked_count
 from flatland.gym.worlds import find_world, included_robot
 from flatland.world import World
 from flatland.worldgen.random_world import DEFAULT_RADIUS, DEFAULT_RESOLUTION

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from flatland.checks import checked_count
 from flatland.geometry import BoolArray
-from flatland.gym.checks import checked_count
 
 if TYPE_CHECKING:
     from flatland.gym.vector import FlatlandVectorEnv

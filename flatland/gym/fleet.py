@@ -12,8 +12,8 @@ from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
+from flatland.checks import checked_count
 from flatland.geometry import FloatArray
-from flatland.gym.checks import checked_count
 from flatland.gym.robots import begin_together, fleet_settings, spawn_robots, stop
 from flatland.gym.stage import RENDER_MODES, Image, Stage
 from flatland.gym.staged import Staged

@@ -11,9 +11,9 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 
+from flatland.checks import checked_count
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray
-from flatland.gym.checks import checked_count
 from flatland.gym.robots import begin_together, fleet_settings, spawn_robots, stop
 from flatland.gym.staged_vector import StagedVector
 from flatland.gym.vector import checked_mask, checked_seeds, masked_infos

@@ -8,8 +8,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from flatland.checks import checked_count
 from flatland.geometry import BoolArray, DoubleArray, FloatArray
-from flatland.gym.checks import checked_count
 from flatland.gym.observations import ObservationPart
 
 if TYPE_CHECKING:

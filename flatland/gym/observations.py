@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import numpy as np
 from gymnasium import spaces
 
+from flatland.checks import checked_count
 from flatland.geometry import DoubleArray, FloatArray
-from flatland.gym.checks import checked_count
 
 if TYPE_CHECKING:
     from flatland.gym.situation import Situation

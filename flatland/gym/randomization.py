@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from flatland.checks import checked_count
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray, FloatArray
-from flatland.gym.checks import checked_count
 from flatland.plugin_api.body_drive import BodyDrive
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
 

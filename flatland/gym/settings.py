@@ -9,10 +9,10 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from flatland.checks import checked_count
 from flatland.gym.actions import Action, VelocityAction
 from flatland.gym.agents import Agent, find_agent
 from flatland.gym.buildings import Buildings
-from flatland.gym.checks import checked_count
 from flatland.gym.endings import Ending, navigation_ending
 from flatland.gym.observations import Observation
 from flatland.gym.randomization import Randomization

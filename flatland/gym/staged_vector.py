@@ -10,8 +10,8 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from flatland.checks import checked_count
 from flatland.geometry import DoubleArray
-from flatland.gym.checks import checked_count
 from flatland.gym.env import FlatlandEnv
 from flatland.gym.stage import Stage
 from flatland.gym.staged import Staged

@@ -11,9 +11,9 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 
+from flatland.checks import checked_count
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray
-from flatland.gym.checks import checked_count
 from flatland.gym.settings import Settings
 from flatland.gym.situation import Rows
 from flatland.gym.staged_vector import StagedVector

@@ -53,6 +53,11 @@ class ModelSources:
         self._source = source
         self._known: dict[str, tuple[str, YamlReader]] = {}
 
+    @property
+    def of_world_file(self) -> bool:
+        """Whether the models are those of the world file, which is being loaded."""
+        return self._source.inputs.is_loading
+
     def read(self, yaml_path: str) -> tuple[str, YamlReader]:
         """Reads a source.
 

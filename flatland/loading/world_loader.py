@@ -15,7 +15,7 @@ from flatland.config.reader import YamlReader, read_yaml
 from flatland.entities.layer import Layer
 from flatland.errors import Place, UnreadableFileError, WorldError, YamlError
 from flatland.geometry import IDENTITY
-from flatland.graph_names import resolve_topic
+from flatland.graph_names import check_model_name, resolve_topic
 from flatland.loading.materials import read_class, read_color, read_material
 from flatland.loading.world_source import WorldSource
 from flatland.maps.map_file import LayerMap
@@ -319,6 +319,10 @@ def _load_models(world: LoadedWorld, reader: YamlReader) -> None:
 
 def _load_model(world: LoadedWorld, entry: YamlReader, names: set[str]) -> None:
     name = entry.get("name", "string")
+    try:
+        check_model_name(name, is_of_file=True)
+    except ValueError as error:
+        raise entry.error(f"failed to spawn model, {error}") from None
     model_reader = entry.with_location(f'model "{name}"')
     pose = model_reader.get("pose", "pose", IDENTITY, finite=True)
     if max(map(abs, pose)) > MAX_MAGNITUDE:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from flatland.checks import plain_path, shown
 from flatland.config.documents import (
     TEXT_NAME,
     is_yaml_text,
@@ -71,12 +72,15 @@ class WorldSource:
             read: Loads a YAML file.
 
         Raises:
-            ValueError: `simplify_map` or `model_path` is invalid.
+            TypeError: `params` is neither a dictionary nor a function.
+            ValueError: `path`, `simplify_map` or `model_path` is invalid.
         """
-        if simplify_map not in SIMPLIFICATIONS:
-            raise ValueError(f"simplify_map must be 0, 1 or 2, got {simplify_map!r}")
+        if isinstance(simplify_map, bool) or simplify_map not in SIMPLIFICATIONS:
+            raise ValueError(f"simplify_map must be 0, 1 or 2, got {shown(simplify_map)}")
+        if not (params is None or isinstance(params, Mapping) or callable(params)):
+            raise TypeError(f"params must be a dictionary or a function, got {shown(params)}")
         current = Source("", str(Path.cwd()))
-        self.path = "" if path is None else current.resolve(os.fspath(path))
+        self.path = "" if path is None else current.resolve(plain_path("path", path))
         self.params = params
         self.simplify_map = simplify_map
         self.inputs = Inputs(params, folders=real_folders(model_path))

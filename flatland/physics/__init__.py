@@ -74,6 +74,10 @@ from flatland.physics.values import (
     to_report,
 )
 from flatland.physics.world import PhysicsWorld
+from flatland.uncopied import uncopied
+
+# `copy` returns the same handle, unless it also copies the world of the handle.
+uncopied("it refers to an object of a world, which World.clone() copies")(Handle)
 
 __all__ = [
     "ALL_BITS",

@@ -6,10 +6,12 @@ from collections.abc import Callable
 
 from flatland import _core
 from flatland.physics.values import StepReport, to_report
+from flatland.uncopied import uncopied
 
 PreSolveHook = Callable[[_core.PreSolveContact, _core.OldManifold], object]
 
 
+@uncopied("PhysicsWorld.copy() returns an independent copy")
 class PhysicsWorld(_core.World):
     """A Box2D world without gravity; owns its bodies, fixtures, joints and contacts.
 

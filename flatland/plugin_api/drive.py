@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from flatland.checks import shown
 from flatland.geometry import IDENTITY, DoubleArray, Pose, Vector2, compose, invert, rotate
 from flatland.plugin_api.noise import GaussianNoise
 from flatland.plugin_api.occasional_warning import OccasionalWarning
@@ -53,8 +54,11 @@ class CommandGuard(Generic[C]):
 
     def __call__(self, command: C) -> bool:
         """Returns whether a command is valid; otherwise logs a warning, at most one a second."""
-        if all(abs(getattr(command, name)) <= MAX_COMMAND for name in command.__slots__):
-            return True
+        try:
+            if all(abs(getattr(command, name)) <= MAX_COMMAND for name in command.__slots__):
+                return True
+        except TypeError:
+            raise TypeError(f"a command must consist of numbers, got {shown(command)}") from None
         self._warning.log(
             "%s: %s is not finite or out of range, the previous command remains in effect",
             self._owner,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from flatland.checks import checked_limit
 from flatland.plugin_api.parameters import read_not_negative
 
 if TYPE_CHECKING:
@@ -103,6 +104,5 @@ class DynamicsLimits:
 
 
 def _checked(name: str, limit: float) -> float:
-    if not limit >= 0:
-        raise ValueError(f"{name} must not be negative or NaN, got {limit}")
-    return 0.0 if math.isinf(limit) else float(limit)
+    number = checked_limit(name, limit)
+    return 0.0 if math.isinf(number) else number

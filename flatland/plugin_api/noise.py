@@ -9,6 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from flatland.checks import checked_count
+
 _LOG = logging.getLogger("flatland")
 
 
@@ -16,14 +18,13 @@ def checked_seed(seed: int | None) -> int:
     """Returns a seed; draws and logs one for None.
 
     Raises:
-        ValueError: The seed is negative.
+        ValueError: The seed is no integer, or negative.
     """
     if seed is None:
         seed = secrets.randbits(31)
         _LOG.info("seed %d drawn at random; use it as the seed to repeat this run", seed)
-    if seed < 0:
-        raise ValueError(f"seed must not be negative, got {seed}")
-    return seed
+        return seed
+    return checked_count("seed", seed, 0)
 
 
 class NoiseStream:

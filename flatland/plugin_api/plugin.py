@@ -26,6 +26,7 @@ from flatland.plugin_api.updates import (
     UpdateFunction,
     is_called_when_due,
 )
+from flatland.uncopied import uncopied
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -42,6 +43,7 @@ T = TypeVar("T")
 C = TypeVar("C", bound="Controller | Crowd")
 
 
+@uncopied("World.clone() copies a world with its plugins")
 class FlatlandPlugin:
     """The common base class of model and world plugins: a name, ports, random numbers and hooks.
 

@@ -10,14 +10,17 @@ import threading
 from collections.abc import Callable, Hashable
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
+from flatland.checks import check_function, shown
 from flatland.errors import PLUGIN_FAULTS, WorldError
 from flatland.graph_names import global_name
+from flatland.uncopied import uncopied
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 SubscriberFault = Callable[["Output[Any]", Callable[[Any], None], BaseException], None]
 
 
+@uncopied("World.clone() copies a world with its outputs")
 class Output(Generic[T]):
     """A stream of values that a plugin emits.
 
@@ -136,7 +139,11 @@ class Output(Generic[T]):
 
         Returns:
             A function that ends this subscription; further calls have no effect.
+
+        Raises:
+            TypeError: `callback` is no function.
         """
+        check_function("callback", callback)
         token = object()
         with self._lock:
             self._subscribers = (*self._subscribers, (token, callback))
@@ -166,6 +173,7 @@ class CommandSource(Protocol[T_co]):
         """Called when the command has other values from now on."""
 
 
+@uncopied("World.clone() copies a world with its commands")
 class Command(Generic[T]):
     """A value that is set from outside and read by a plugin.
 
@@ -283,7 +291,9 @@ class Command(Generic[T]):
             TypeError: The value does not have the type of the command.
         """
         if not isinstance(value, self.value_type):
-            raise TypeError(f"command {self.topic} takes {self.value_type.__name__}, got {value!r}")
+            raise TypeError(
+                f"command {self.topic} takes {self.value_type.__name__}, got {shown(value)}"
+            )
         if self.on_set is not None:
             self.on_set(self, value)
         if self.accept is None or self.accept(value):
@@ -291,6 +301,7 @@ class Command(Generic[T]):
             self._received += 1
 
 
+@uncopied("World.clone() copies a world with its commands")
 class CommandTopic(Generic[T]):
     """All commands of one topic; they are set together, like the subscribers of a ROS topic."""
 

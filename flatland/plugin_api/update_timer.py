@@ -6,6 +6,7 @@ import math
 from fractions import Fraction
 from typing import TYPE_CHECKING, Final
 
+from flatland.checks import checked_limit
 from flatland.timekeeper import NANOSECONDS, Timekeeper
 
 if TYPE_CHECKING:
@@ -32,9 +33,7 @@ class UpdateTimer:
         Raises:
             ValueError: The rate is negative or NaN.
         """
-        if not rate >= 0:
-            raise ValueError(f"rate must not be negative or NaN [Hz], got {rate}")
-        self.rate = float(rate)
+        self.rate = checked_limit("rate", rate, "Hz")
         self._always = math.isinf(rate)
         self._cycle = 0
         self._per_nanosecond = 0

@@ -21,6 +21,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from flatland.checks import checked_path
 from flatland.errors import FlatlandError
 
 FORMAT: Final = "flatland recording 1"
@@ -66,7 +67,7 @@ class LogWriter:
         Raises:
             RecordingError: The file cannot be created.
         """
-        self.path = os.fspath(path)
+        self.path = checked_path("path", path)
         try:
             self._file = os.open(
                 self.path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND, 0o666
@@ -126,7 +127,7 @@ def read_recording(path: str | os.PathLike[str]) -> Recording:
         RecordingError: The file cannot be read, is not a recording, or a line other than the last
             one is damaged; the text names the line.
     """
-    name = os.fspath(path)
+    name = checked_path("path", path)
     try:
         content = Path(path).read_bytes()
     except OSError as error:

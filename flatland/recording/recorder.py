@@ -16,6 +16,7 @@ from flatland.plugin_api.ports import Command
 from flatland.recording.log_file import FORMAT, LogWriter, Record, RecordingError, encode_value
 from flatland.runtime.observer import WorldObserver
 from flatland.timekeeper import NANOSECONDS
+from flatland.uncopied import uncopied
 from flatland.version import VERSION
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger("flatland")
 
 
+@uncopied("World.record() starts another recording")
 class Recorder(WorldObserver):
     """Records one world, from before its first step until `close`; created by `World.record`.
 

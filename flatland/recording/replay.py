@@ -14,6 +14,7 @@ from flatland.recording.recorder import checksum, digests
 from flatland.runtime.observer import WorldObserver
 from flatland.runtime.snapshot import WorldSnapshot
 from flatland.timekeeper import NANOSECONDS
+from flatland.uncopied import uncopied
 from flatland.world import World
 
 _MAX_LISTED: Final = 5  # changed files in an error message
@@ -34,6 +35,7 @@ class Difference:
     text: str
 
 
+@uncopied("create another Replay of the recording")
 class Replay:
     """Repeats a recorded run in plain Python.
 

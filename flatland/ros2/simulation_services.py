@@ -31,7 +31,7 @@ from flatland.geometry import (
     quaternion_from_yaw,
     transform_points,
 )
-from flatland.graph_names import is_legal_namespace
+from flatland.graph_names import check_namespace
 from flatland.node.adapters.receivers import planar_pose
 from flatland.node.clock import stamp
 from flatland.node.names import UniqueNames, sendable_text
@@ -332,9 +332,10 @@ class SimulationServices:
         path = _path_of(resource.uri, resource.resource_string, response)
         if not request.name and not request.allow_renaming:
             raise RefusedError(response.NAME_INVALID, "name is empty, and allow_renaming is false")
-        if not is_legal_namespace(request.entity_namespace):
-            text = f'illegal namespace "{request.entity_namespace}"'
-            raise RefusedError(response.NAMESPACE_INVALID, text)
+        try:
+            check_namespace(request.entity_namespace)
+        except ValueError as error:
+            raise RefusedError(response.NAMESPACE_INVALID, str(error)) from None
         pose = _planar(request.initial_pose.header, request.initial_pose.pose, response)
 
         def spawn() -> str:

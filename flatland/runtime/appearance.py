@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from flatland import checks
 from flatland.config.hints import did_you_mean
 from flatland.errors import WorldError
 
@@ -37,10 +38,8 @@ def find_bodies(model: Model, name: str) -> list[Body]:
 
 def plain_numbers(color: Sequence[float]) -> tuple[float, ...] | str:
     """Returns a colour as plain numbers if it is one; an invalid one is rejected later."""
-    try:
-        return tuple(float(number) for number in color)
-    except (TypeError, ValueError):
-        return repr(color)
+    numbers = checks.plain_numbers(color, (3, 4))
+    return checks.shown(color) if numbers is None else numbers
 
 
 def checked_color(color: tuple[float, ...] | str) -> tuple[float, ...]:

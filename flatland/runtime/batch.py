@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
+from flatland.checks import checked_count
 from flatland.physics import run_worlds
+from flatland.runtime.stepping import MAX_STEPS
 
 if TYPE_CHECKING:
     from flatland.physics import Run
     from flatland.runtime.stepping import StepRun
     from flatland.world import World
+
+MAX_THREADS: Final = 4096
 
 
 def step_worlds(worlds: Sequence[World], n: int = 1, num_threads: int = 0) -> None:
@@ -26,13 +30,13 @@ def step_worlds(worlds: Sequence[World], n: int = 1, num_threads: int = 0) -> No
         num_threads: Maximum number of threads; 0 for one per core.
 
     Raises:
-        ValueError: A world is given twice, or the number of threads is negative.
+        ValueError: A world is given twice, or a number is no integer or negative.
         WorldError: As `World.step`.
         Exception: As `World.step`. If several worlds raise, the exception of the first one is
             raised after all other worlds have been stepped.
     """
-    if num_threads < 0:
-        raise ValueError(f"num_threads must not be negative, got {num_threads}")
+    n = checked_count("n", n, 0, MAX_STEPS)
+    num_threads = checked_count("num_threads", num_threads, 0, MAX_THREADS)
     if len({id(world) for world in worlds}) != len(worlds):
         raise ValueError("each world must be given at most once")
     batch = _Batch(worlds, n)

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from flatland.checks import plain_path
 from flatland.entities.layer import Layer
 from flatland.errors import WorldError
 from flatland.maps.map_file import LayerMap
@@ -99,7 +100,7 @@ class LayerSet:
 
     def set_map(self, layer: str, source: str | os.PathLike[str] | OccupancyGrid) -> None:
         """Replaces the map of a layer; see `World.set_layer_map`."""
-        given = source if isinstance(source, OccupancyGrid) else os.fspath(source)
+        given = source if isinstance(source, OccupancyGrid) else plain_path("source", source)
         arguments = {"name": layer, "source": given}
         self._changes.make("set_layer_map", arguments, lambda: self._set_map(layer, given))
 

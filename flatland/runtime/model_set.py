@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from flatland.checks import checked_names, plain_path, quoted, shown
 from flatland.errors import BatchError, FlatlandError, WorldError, YamlError
 from flatland.geometry import Pose, finite_pose
-from flatland.graph_names import is_legal_namespace
+from flatland.graph_names import check_model_name, check_namespace
 from flatland.loading.model_loader import ModelLoader
 from flatland.loading.model_source import ModelSources, ModelSpec
 from flatland.runtime.appearance import (
@@ -101,8 +101,8 @@ class ModelSet:
         """
         try:
             return self.by_name[name]
-        except KeyError:
-            raise WorldError(f'model with name "{name}" does not exist') from None
+        except (KeyError, TypeError):
+            raise WorldError(f"model with name {quoted(name)} does not exist") from None
 
     # -- requests --------------------------------------------------------------------------
 
@@ -116,12 +116,12 @@ class ModelSet:
     ) -> Model | None:
         """Adds a model; see `World.spawn_model`."""
         check_if_blocked(if_blocked)
-        spec = ModelSpec(os.fspath(yaml_path), name, namespace, pose)
+        spec = self._checked_spec(yaml_path, name, namespace, pose)
         arguments = {
             "yaml_path": spec.yaml_path,
             "name": name,
             "namespace": namespace,
-            "pose": plain_pose(pose),
+            "pose": spec.pose,
             "if_blocked": if_blocked,
         }
         return self._changes.make("spawn_model", arguments, lambda: self._spawn(spec, if_blocked))
@@ -131,16 +131,17 @@ class ModelSet:
     ) -> Model | None:
         """Moves a model; see `World.move_model`."""
         check_if_blocked(if_blocked)
+        target = _checked_pose("move", name, pose)
         arguments = {
             "name": name,
-            "pose": plain_pose(pose),
+            "pose": target,
             "if_blocked": if_blocked,
             "keep_odometry": keep_odometry,
         }
         return self._changes.make(
             "move_model",
             arguments,
-            lambda: self._move(name, pose, if_blocked, keep_odometry),
+            lambda: self._move(name, target, if_blocked, keep_odometry),
         )
 
     def delete_model(self, name: str) -> None:
@@ -151,8 +152,15 @@ class ModelSet:
         self, models: Iterable[ModelSpec], if_blocked: IfBlocked
     ) -> list[Model] | None:
         """Adds several models; see `World.spawn_models`."""
-        specs = [replace(spec, pose=plain_pose(spec.pose)) for spec in models]
         check_if_blocked(if_blocked)
+        specs = []
+        for index, spec in enumerate(models):
+            with _item(f"models[{index}]", index):
+                if not isinstance(spec, ModelSpec):
+                    raise WorldError(f"a model must be a ModelSpec, got {shown(spec)}")
+                specs.append(
+                    self._checked_spec(spec.yaml_path, spec.name, spec.namespace, spec.pose)
+                )
         arguments = {"models": specs, "if_blocked": if_blocked}
         return self._changes.make(
             "spawn_models", arguments, lambda: self._spawn_all(specs, if_blocked)
@@ -165,9 +173,11 @@ class ModelSet:
         keep_odometry: bool,
     ) -> list[Model] | None:
         """Moves several models; see `World.move_models`."""
-        pairs = poses.items() if isinstance(poses, Mapping) else poses
-        targets = [(name, plain_pose(pose)) for name, pose in pairs]
         check_if_blocked(if_blocked)
+        targets = []
+        for index, (name, pose) in enumerate(_pairs(poses)):
+            with _item(f"models[{index}]", index):
+                targets.append((name, _checked_pose("move", name, pose)))
         return self._changes.make(
             "move_models",
             {"poses": targets, "if_blocked": if_blocked, "keep_odometry": keep_odometry},
@@ -176,7 +186,7 @@ class ModelSet:
 
     def delete_models(self, names: Iterable[str]) -> None:
         """Removes several models; see `World.delete_models`."""
-        listed = list(names)
+        listed = checked_names("names", names)
         self._changes.make("delete_models", {"names": listed}, lambda: self._delete_all(listed))
 
     def set_appearance(
@@ -188,7 +198,7 @@ class ModelSet:
         visible: bool | None,
     ) -> None:
         """Changes colour, layers and visibility; see `World.set_appearance`."""
-        names = [layers] if isinstance(layers, str) else None if layers is None else list(layers)
+        names = None if layers is None else checked_names("layers", layers)
         numbers = None if color is None else plain_numbers(color)
         shown = None if visible is None else bool(visible)
         self._changes.make(
@@ -222,22 +232,17 @@ class ModelSet:
 
     def _move_all(
         self,
-        poses: Sequence[tuple[str, Sequence[float]]],
+        poses: Sequence[tuple[str, Pose]],
         if_blocked: IfBlocked,
         keep_odometry: bool,
     ) -> list[Model]:
         """Moves models together."""
         moved: dict[str, Model] = {}
-        targets: list[Pose] = []
-        for index, (name, pose) in enumerate(poses):
+        for index, (name, _) in enumerate(poses):
             with _item(f"models[{index}]", index):
                 moved[name] = self._find_to("move", name)
                 _refuse_repetition(moved, index, name)
-                try:
-                    targets.append(finite_pose(pose))
-                except ValueError as error:
-                    raise WorldError(f'failed to move model "{name}", {error}') from None
-        models = list(moved.values())
+        models, targets = list(moved.values()), [pose for _, pose in poses]
         previous: list[Mapping[str, Pose]] = [
             {body.name: body.pose for body in model.bodies} for model in models
         ]
@@ -306,12 +311,13 @@ class ModelSet:
             FlatlandError: The model is invalid, or the pose is blocked; nothing was changed.
         """
         name = spec.name
-        checked_pose = self._check_spawn(spec)
+        if name in self.by_name:
+            raise YamlError(f'Model with name "{name}" already exists')
         path, reader = sources.read(spec.yaml_path)
         model = self._make_model(name, spec.namespace, path)
         loader = ModelLoader(self._physics, self._collision_filter, model, reader)
         try:
-            loader.load_bodies_and_joints(checked_pose)
+            loader.load_bodies_and_joints(finite_pose(spec.pose))
             self._place(model, model.pose, if_blocked, "spawn")
             self._contacts.add_bodies(model.bodies)
             for entry in self._host.require_plugins(loader.plugin_entries(), name):
@@ -347,13 +353,11 @@ class ModelSet:
         except ValueError as error:
             raise WorldError(f'failed to move model "{model.name}", {error}') from None
 
-    def _move(
-        self, name: str, pose: Sequence[float], if_blocked: IfBlocked, keep_odometry: bool
-    ) -> Model:
+    def _move(self, name: str, pose: Pose, if_blocked: IfBlocked, keep_odometry: bool) -> Model:
         model = self._find_to("move", name)
         previous = {body.name: body.pose for body in model.bodies}
         try:
-            self._place(model, finite_pose(pose), if_blocked, "move")
+            self._place(model, pose, if_blocked, "move")
         except ValueError as error:
             raise WorldError(f'failed to move model "{name}", {error}') from None
         self._announce_moves([model], [previous], if_blocked, keep_odometry)
@@ -413,23 +417,30 @@ class ModelSet:
             for body in model.bodies:
                 body.awake = True
 
-    def _check_spawn(self, spec: ModelSpec) -> Pose:
-        name, namespace = spec.name, spec.namespace
-        if not name:
-            raise WorldError("failed to spawn model, its name must not be empty")
-        if name in self.by_name:
-            raise YamlError(f'Model with name "{name}" already exists')
-        if not spec.yaml_path:
-            raise WorldError(f'failed to spawn model "{name}", the path must not be empty')
-        if not is_legal_namespace(namespace):
-            raise WorldError(
-                f'failed to spawn model "{name}", namespace "{namespace}" is not a legal ROS '
-                'name: it must start with a letter and hold only letters, digits, "_" and "/"'
-            )
+    def _checked_spec(
+        self,
+        yaml_path: str | os.PathLike[str],
+        name: str,
+        namespace: str,
+        pose: Sequence[float],
+    ) -> ModelSpec:
+        """Returns a model to spawn; see `ModelSpec` for the arguments.
+
+        Raises:
+            WorldError: An argument is invalid.
+        """
         try:
-            return finite_pose(spec.pose)
+            check_model_name(name, is_of_file=self._new_sources().of_world_file)
+        except ValueError as error:
+            raise WorldError(f"failed to spawn model, {error}") from None
+        try:
+            path = plain_path("yaml_path", yaml_path)
+            check_namespace(namespace)
         except ValueError as error:
             raise WorldError(f'failed to spawn model "{name}", {error}') from None
+        if not path:
+            raise WorldError(f'failed to spawn model "{name}", the path must not be empty')
+        return ModelSpec(path, name, namespace, _checked_pose("spawn", name, pose))
 
     def _find_to(self, verb: str, name: str) -> Model:
         """Returns the model of a name.
@@ -438,11 +449,9 @@ class ModelSet:
             WorldError: The model does not exist; the text names the operation.
         """
         try:
-            return self.by_name[name]
-        except KeyError:
-            raise WorldError(
-                f'failed to {verb} model, model with name "{name}" does not exist'
-            ) from None
+            return self.find(name)
+        except WorldError as error:
+            raise WorldError(f"failed to {verb} model, {error.message}") from None
 
     def _place(self, model: Model, pose: Pose, if_blocked: IfBlocked, verb: str) -> None:
         """Puts a model at a pose, or at another one if that is blocked."""
@@ -478,9 +487,36 @@ def _refuse_repetition(found: Mapping[str, Model], index: int, name: str) -> Non
         raise WorldError(f'model "{name}" occurs twice in the request')
 
 
-def plain_pose(pose: Sequence[float]) -> Sequence[float]:
-    """Returns a pose as plain numbers if it is one; an invalid one is rejected later."""
+def _pairs(
+    poses: Mapping[str, Sequence[float]] | Iterable[tuple[str, Sequence[float]]],
+) -> list[tuple[str, Sequence[float]]]:
+    """Returns the poses of models as pairs (name, pose).
+
+    Raises:
+        ValueError: They are neither a dictionary nor pairs.
+    """
     try:
-        return tuple(float(number) for number in pose)
+        pairs = poses.items() if isinstance(poses, Mapping) else poses
+        return [(name, pose) for name, pose in pairs]
     except (TypeError, ValueError):
-        return repr(pose)  # type: ignore[return-value]
+        raise ValueError(
+            f"poses must be a dictionary of poses by name, or pairs (name, pose), got "
+            f"{shown(poses)}"
+        ) from None
+
+
+def _checked_pose(verb: str, name: object, pose: Sequence[float]) -> Pose:
+    """Returns the pose of a request.
+
+    Args:
+        verb: Name of the operation for the error, such as `spawn`.
+        name: Name of the model.
+        pose: The pose.
+
+    Raises:
+        WorldError: It does not consist of three finite numbers.
+    """
+    try:
+        return finite_pose(pose)
+    except ValueError as error:
+        raise WorldError(f"failed to {verb} model {quoted(name)}, {error}") from None

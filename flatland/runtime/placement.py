@@ -10,12 +10,30 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 
+from flatland.checks import (
+    check_choice,
+    checked_count,
+    checked_names,
+    checked_not_negative,
+    checked_positive,
+    plain_numbers,
+    shown,
+)
 from flatland.defaults import IF_BLOCKED
 from flatland.defaults import IfBlocked as IfBlocked
 from flatland.entities.layer import Layer
 from flatland.entities.model import Model
 from flatland.errors import WorldError
-from flatland.geometry import BoolArray, Bounds, DoubleArray, Pose, bounds_of, finite_pose
+from flatland.geometry import (
+    BoolArray,
+    Bounds,
+    DoubleArray,
+    Pose,
+    Vector2,
+    bounds_of,
+    finite_place,
+    finite_pose,
+)
 from flatland.runtime.free_space import FreeSpace, Spread
 from flatland.runtime.nearest_place import SEARCH_RADIUS, nearest_offset
 
@@ -32,13 +50,13 @@ Models: TypeAlias = str | Model | Iterable[str | Model]
 TOLERANCE: Final = 0.005  # m of penetration that is allowed, as by the Box2D solver
 _ROUNDING: Final = 1e-4  # m of overlap of touching shapes that single precision may cause
 _FIRST_TRIES: Final = 1024
+_MAX_PLACES: Final = 10**6
 _MAX_SPACES: Final = 8  # free spaces in the cache
 
 
 def check_if_blocked(if_blocked: str) -> None:
     """Raises ValueError for an invalid value of `if_blocked`."""
-    if if_blocked not in IF_BLOCKED:
-        raise ValueError(f"if_blocked must be one of {', '.join(IF_BLOCKED)}, got {if_blocked!r}")
+    check_choice("if_blocked", if_blocked, IF_BLOCKED)
 
 
 class Placement:
@@ -161,11 +179,12 @@ class Placement:
         ignore: Models,
     ) -> bool:
         """Checks one pose; see `World.is_free`."""
-        x, y, theta = finite_pose(pose if len(pose) == 3 else (*pose, 0.0))
-        least_gap = _checked("clearance", clearance) - TOLERANCE
+        numbers = plain_numbers(pose, (2, 3))
+        x, y, theta = finite_pose(pose if numbers is None else (*numbers, 0.0)[:3])
+        least_gap = checked_not_negative("clearance", clearance, "m") - TOLERANCE
         physics, ignored = self._physics, self._bodies(ignore)
         if radius is not None and model is None:
-            disc, bits = _checked("radius", radius), self._bits(layers)
+            disc, bits = checked_not_negative("radius", radius, "m"), self._bits(layers)
             free = physics.free_discs(
                 [(x, y, theta)], disc, bits, ignored=ignored, least_gap=least_gap
             )
@@ -188,13 +207,11 @@ class Placement:
         ignore: Models,
     ) -> DoubleArray:
         """Draws free poses; see `World.sample_free`."""
-        if n < 0:
-            raise ValueError(f"n must not be negative, got {n}")
-        if not _checked("radius", radius) > 0:
-            raise ValueError(f"radius must be positive [m], got {radius}")
-        _checked("clearance", clearance)
+        n = checked_count("n", n, 0, _MAX_PLACES)
+        radius = checked_positive("radius", radius, "m")
+        clearance = checked_not_negative("clearance", clearance, "m")
         bits, ignored = self._bits(layers), self._bodies(ignore)
-        start = None if connected_to is None else finite_pose((*connected_to[:2], 0.0))[:2]
+        start = None if connected_to is None else _checked_start(connected_to)
         generator = self._generator(rng)
         space = self._free_space(bits, radius, clearance, bounds)
         cells = space.cells(start)
@@ -240,41 +257,46 @@ class Placement:
         return space
 
     def _generator(self, rng: np.random.Generator | int | None) -> np.random.Generator:
+        if isinstance(rng, np.random.Generator):
+            return rng
         if rng is not None:
-            return np.random.default_rng(rng)
+            return np.random.default_rng(checked_count("rng", rng, 0))
         if self._rng is None:
             seeds = [self._find_seed(), zlib.crc32(b"placement")]
             self._rng = np.random.default_rng(np.random.SeedSequence(seeds))
         return self._rng
 
     def _bits(self, layers: str | Iterable[str]) -> int:
-        names = [layers] if isinstance(layers, str) else list(layers)
+        names = checked_names("layers", layers)
         unknown = self._collision_filter.unknown(names)
         if unknown:
             raise WorldError(f'layer with name "{unknown[0]}" does not exist')
         return self._collision_filter.category_bits(names)
 
     def _bodies(self, models: Models) -> list[PhysicsBody]:
-        each = [models] if isinstance(models, str | Model) else models
+        given = [models] if isinstance(models, str | Model) else models
+        each = list(given) if isinstance(given, Iterable) else [given]
+        if not all(isinstance(one, str | Model) for one in each):
+            raise ValueError(f"expected a model, its name, or several of them, got {shown(models)}")
         found = [self._find_model(one) if isinstance(one, str) else one for one in each]
         return [body.physics for model in found for body in model.bodies]
 
 
-def _checked(name: str, value: float) -> float:
-    if not (math.isfinite(value) and value >= 0):
-        raise ValueError(f"{name} must be finite and not negative [m], got {value}")
-    return value
+def _checked_start(start: Sequence[float]) -> Vector2:
+    """Returns the first two numbers of a place or a pose."""
+    numbers = plain_numbers(start, (2, 3))
+    return finite_place("connected_to", start if numbers is None else numbers[:2])
 
 
 def _checked_bounds(bounds: Sequence[float]) -> Bounds:
-    x_min, y_min, x_max, y_max = (float(number) for number in bounds)
-    if not (
-        all(map(math.isfinite, (x_min, y_min, x_max, y_max))) and x_min < x_max and y_min < y_max
-    ):
-        raise ValueError(
-            f"bounds must be (x_min, y_min, x_max, y_max) of an area [m], got {tuple(bounds)}"
-        )
-    return (x_min, y_min, x_max, y_max)
+    numbers = plain_numbers(bounds, (4,))
+    if numbers is not None and all(map(math.isfinite, numbers)):
+        x_min, y_min, x_max, y_max = numbers
+        if x_min < x_max and y_min < y_max:
+            return (x_min, y_min, x_max, y_max)
+    raise ValueError(
+        f"bounds must be (x_min, y_min, x_max, y_max) of an area [m], got {shown(bounds)}"
+    )
 
 
 def _poses(points: DoubleArray, theta: float) -> DoubleArray:

@@ -14,6 +14,7 @@ from flatland.errors import WorldError
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, describe
 from flatland.runtime.appearance import appearance_of
 from flatland.timekeeper import NANOSECONDS
+from flatland.uncopied import uncopied
 
 if TYPE_CHECKING:
     from flatland.copying.kinds import Kind
@@ -41,6 +42,7 @@ _ADVICE: Final = (
 )
 
 
+@uncopied("World.restore() accepts a snapshot any number of times, World.clone() copies a world")
 class WorldSnapshot:
     """The state of a world at one time, returned by `World.snapshot`.
 

@@ -8,7 +8,7 @@ only in how they have the core perform a run.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol
 
 from flatland.physics import Run, RunEnd, to_report
 
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 # As integers, since comparisons with members of an enumeration take as long as a short step.
 _DONE, _BEFORE, _PHYSICS, _AFTER_PHYSICS, _AFTER, _LAST_CALLS = map(int, RunEnd)
+
+MAX_STEPS: Final = 2**62
+"""Greatest number of steps of a call, in the range of the integers of the core."""
 
 
 class SteppedWorld(Protocol):

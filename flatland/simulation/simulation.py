@@ -10,15 +10,25 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
+from flatland.checks import (
+    check_kind,
+    checked_count,
+    checked_limit,
+    checked_not_negative,
+    checked_number,
+    checked_positive,
+    shown,
+)
 from flatland.defaults import MAX_LAG
 from flatland.errors import WorldError
 from flatland.physics import WorkTimes
-from flatland.runtime.stepping import Pace
+from flatland.runtime.stepping import MAX_STEPS, Pace
 from flatland.simulation.cycle_statistics import CycleStatistics, CycleWindow
 from flatland.simulation.pause_holds import PauseHolds
 from flatland.simulation.rate_monitor import RateMonitor
 from flatland.simulation.step_requests import StepRequests
 from flatland.timekeeper import NANOSECONDS, Timekeeper
+from flatland.uncopied import uncopied
 from flatland.world import World
 
 _PAUSED_PERIOD: Final = 0.01  # s between two cycles of a paused world without a rate
@@ -96,6 +106,7 @@ class _ElapsedTime:
         return self._total
 
 
+@uncopied("create another Simulation for a copy of the world, which World.clone() returns")
 class Simulation:
     """Steps a world at a rate, in the thread that calls `run`.
 
@@ -142,19 +153,20 @@ class Simulation:
             wait: Waits for an event for at most some wall time [s]; returns whether it is set.
 
         Raises:
-            ValueError: The rate or the lag is negative or not a number, or the lag is infinite.
+            ValueError: The rate or the lag is negative or not a number, the lag is infinite, or the
+                period is not positive.
+            TypeError: `world` is no world.
         """
-        if not 0 <= max_lag < math.inf:
-            raise ValueError(f"max_lag must be finite and not negative [s], got {max_lag}")
+        check_kind("world", world, World, "a World")
         self.world = world
         self.lockstep = lockstep
         self.statistics: CycleStatistics | None = None
         self.lost_time = 0.0
         self.holds = PauseHolds(world)
         self._period = _period_of(update_rate)
-        self._max_lag = max_lag
+        self._max_lag = checked_not_negative("max_lag", max_lag, "s")
         self._report = report
-        self._report_period = report_period
+        self._report_period = checked_positive("report_period", report_period, "s")
         self._clock = clock
         self._wait = wait
         self._wake = threading.Event()
@@ -215,10 +227,9 @@ class Simulation:
             stops first.
 
         Raises:
-            ValueError: `count` is less than 1.
+            ValueError: `count` is no integer, or less than 1.
         """
-        if count < 1:
-            raise ValueError(f"the number of steps must be at least 1, got {count}")
+        count = checked_count("count", count, 1, MAX_STEPS)
         done = self._steps.add(count)
         self._wake.set()
         self.world.physics.jobs.interrupt()
@@ -237,7 +248,9 @@ class Simulation:
 
         Raises:
             WorldError: The world is closed, or another simulation runs it.
+            ValueError: `duration` is negative or not a number.
         """
+        duration = checked_limit("duration", duration, "s")
         timekeeper = self.world.timekeeper
         start, elapsed = self._clock(), _ElapsedTime(timekeeper)
         duration_ns = math.inf if math.isinf(duration) else round(duration * NANOSECONDS)
@@ -377,6 +390,7 @@ def _period_of(update_rate: float) -> float:
     Raises:
         ValueError: The rate is negative or not a number.
     """
-    if math.isnan(update_rate) or update_rate < 0:
-        raise ValueError(f"update_rate must not be negative, got {update_rate}")
-    return 0.0 if update_rate == 0 else 1.0 / update_rate
+    rate = checked_number("update_rate", update_rate, "Hz")
+    if math.isnan(rate) or rate < 0:
+        raise ValueError(f"update_rate must not be negative, got {shown(update_rate)}")
+    return 0.0 if rate == 0 else 1.0 / rate

@@ -9,6 +9,7 @@ import socket
 from dataclasses import dataclass
 from urllib.parse import quote, urlsplit
 
+from flatland.checks import shown
 from flatland.defaults import WEB_MIN_TOKEN
 
 
@@ -40,9 +41,13 @@ class Access:
         """Returns the access for an address, with a random token if one is required and missing.
 
         Raises:
-            ValueError: A token is too short, or both are equal.
+            ValueError: The host or a token is no text, a token is too short, or both are equal.
         """
+        if not isinstance(host, str) or "\0" in host:
+            raise ValueError(f"host must be a name or an address, got {shown(host)}")
         for given in (token, view_token):
+            if given is not None and not isinstance(given, str):
+                raise ValueError(f"a token must be a text, got {shown(given)}")
             if given is not None and len(given) < WEB_MIN_TOKEN:
                 raise ValueError(
                     f"a token must have at least {WEB_MIN_TOKEN} characters, got {len(given)}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import re
 import time
 from collections.abc import Awaitable, Callable, Hashable
 from functools import partial
@@ -34,7 +33,6 @@ READING_SHARE: Final = 0.05
 T = TypeVar("T")
 
 _SUPERSEDED: Final = {"superseded": True}
-_NAME: Final = re.compile(r"[A-Za-z0-9_./ ()+-]+")
 
 _Hold = tuple["Client", WorldFeed, int]  # the last part is the id of the model
 _Drive = tuple["Client", WorldFeed, str]  # the last part is the topic
@@ -124,10 +122,6 @@ class Commands:
 
     async def _spawn(self, client: Client, feed: WorldFeed, fields: Any) -> dict[str, str]:
         file, name, namespace = fields["file"], fields["name"], fields.get("namespace", "")
-        if not _NAME.fullmatch(name):
-            raise WorldError(
-                f'the name "{name}" has a character other than letters, digits, _./()+-'
-            )
         pose, source = fields["pose"], feed.world.source
         path = check_file(file)
         store = await read_in_time_async(lambda: source.read_models_ahead([path]))

@@ -11,7 +11,7 @@ from typing import Any, Final
 from flatland.geometry import MAX_MAGNITUDE, Pose
 
 MAX_SIZE: Final = 16 * 1024  # bytes of a message
-MAX_NAME: Final = 200  # characters of a name
+MAX_NAME: Final = 200  # characters of the name of a topic
 MAX_PATH: Final = 4096  # characters of the path of a file
 MAX_STEPS: Final = 10_000
 MAX_SERIES: Final = 64
@@ -44,15 +44,22 @@ class Message:
 Check = Callable[[object], Any]
 
 
-def _text(limit: int, *, empty: bool = False) -> Check:
+def _text(limit: int) -> Check:
     def check(value: object) -> str:
-        if not isinstance(value, str) or len(value) > limit or not (value or empty):
+        if not isinstance(value, str) or not 0 < len(value) <= limit:
             raise ValueError(f"a text of at most {limit} characters")
         if any(ord(c) < 32 or 0xD800 <= ord(c) < 0xE000 for c in value):
             raise ValueError("a text without control characters")
         return value
 
     return check
+
+
+def _any_text(value: object) -> str:
+    """Returns a text, which a request checks itself."""
+    if not isinstance(value, str):
+        raise ValueError("a text")
+    return value
 
 
 def _number(low: float, high: float) -> Check:
@@ -144,8 +151,8 @@ _FIELDS: Final[dict[str, tuple[dict[str, Check], dict[str, Check]]]] = {
     "hold": (dict([_MODEL]), {}),
     "release": (dict([_MODEL]), {}),
     "spawn": (
-        {"file": _text(MAX_PATH), "name": _text(MAX_NAME), "pose": _pose},
-        {"namespace": _text(MAX_NAME, empty=True)},
+        {"file": _text(MAX_PATH), "name": _any_text, "pose": _pose},
+        {"namespace": _any_text},
     ),
     "preview": ({"file": _text(MAX_PATH)}, {}),
     "delete": (dict([_MODEL]), {}),

@@ -7,13 +7,16 @@ import secrets
 import sys
 from typing import TYPE_CHECKING, Self
 
+from flatland.checks import checked_count
 from flatland.runtime.observer import WorldObserver
+from flatland.uncopied import uncopied
 from flatland.web.viewer import WebViewer
 
 if TYPE_CHECKING:
     from flatland.world import World
 
 
+@uncopied("World.view() opens a view of another world")
 class LiveView(WorldObserver):
     """Shows a world in the browser until the view or the world is closed; see `World.view`.
 
@@ -39,8 +42,7 @@ class LiveView(WorldObserver):
             FlatlandError: The world is closed, or the server cannot listen on the port.
             ValueError: An argument is out of range.
         """
-        if not height > 0:
-            raise ValueError(f"height must be positive [pixels], got {height}")
+        height = checked_count("height", height)
         world.check_open()
         self.world = world
         self._height = height

@@ -16,6 +16,7 @@ from typing import Final, cast
 import numpy as np
 from aiohttp import WSCloseCode, web
 
+from flatland.checks import checked_count
 from flatland.defaults import WEB_HOST, WEB_PORT
 from flatland.errors import FlatlandError
 from flatland.geometry import IDENTITY, FloatArray
@@ -86,8 +87,7 @@ class WebViewer:
         Raises:
             ValueError: The port is out of range, a token is too short, or both are equal.
         """
-        if not 0 <= port <= 65535:
-            raise ValueError(f"port must be from 0 to 65535, got {port}")
+        port = checked_count("port", port, 0, 65535)
         self._access = Access.for_host(host, token, view_token, read_only=read_only)
         self._port = port
         self._embeddable = embeddable

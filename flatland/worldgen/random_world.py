@@ -13,6 +13,14 @@ from typing import Any, Final
 
 import numpy as np
 
+from flatland.checks import (
+    check_choice,
+    checked_count,
+    checked_path,
+    checked_range,
+    plain_numbers,
+    shown,
+)
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, Pose
 from flatland.maps.occupancy_grid import FREE as FREE_CELL
@@ -139,12 +147,12 @@ class RandomWorld:
                 not.
             OSError: A file cannot be written.
         """
-        target = Path(folder)
+        target = Path(checked_path("folder", folder))
         if target.exists() or target.is_symlink():
             raise WorldError(f"the folder {target} exists")
         if not target.parent.is_dir():
             raise WorldError(f"the folder {target.parent} does not exist")
-        if robot is not None and not Path(robot).is_file():
+        if robot is not None and not Path(checked_path("robot", robot)).is_file():
             raise WorldError(f"the model file {os.fspath(robot)} does not exist")
         write_new(target, self.files(target.name, robot))
         return target / "world.yaml"
@@ -171,12 +179,11 @@ def generate(
     Raises:
         ValueError: An argument is invalid.
     """
-    generator = _GENERATORS.get(kind)
-    if generator is None:
-        raise ValueError(f"kind must be one of {', '.join(KINDS)}, got {kind!r}")
-    _check_seed(seed)
-    _check_range("resolution", resolution, _RESOLUTIONS)
-    _check_range("radius", radius, _RADII)
+    check_choice("kind", kind, KINDS)
+    generator = _GENERATORS[kind]
+    seed = checked_count("seed", seed, 0, _MAX_SEED)
+    resolution = checked_range("resolution", resolution, *_RESOLUTIONS, "m")
+    radius = checked_range("radius", radius, *_RADII, "m")
     width, height = _checked_size(kind, size, generator.min_size, resolution)
     rng = np.random.default_rng((generator.number, seed))
     reach = Reach(radius, resolution)
@@ -210,37 +217,25 @@ def _start(cells: Any, resolution: float, radius: float) -> Pose:
     return (x, y, 0.0)
 
 
-def _check_seed(seed: int) -> None:
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)):
-        raise ValueError(f"seed must be an integer of at least 0, got {seed!r}")
-    if not 0 <= seed <= _MAX_SEED:
-        raise ValueError(f"seed must be from 0 to {_MAX_SEED}, got {seed}")
-
-
-def _check_range(name: str, value: float, limits: tuple[float, float]) -> None:
-    if not limits[0] <= value <= limits[1]:
-        raise ValueError(f"{name} must be from {limits[0]:g} to {limits[1]:g} m, got {value:g}")
-
-
 def _checked_size(
     kind: str, size: tuple[float, float], least: tuple[float, float], resolution: float
 ) -> tuple[float, float]:
-    try:
-        width, height = (float(side) for side in size)
-    except (TypeError, ValueError):
-        raise ValueError(f"size must be a width and a height in metres, got {size!r}") from None
-    shown = f"{width:g} x {height:g} m"
+    sides = plain_numbers(size, (2,))
+    if sides is None:
+        raise ValueError(f"size must be a width and a height in metres, got {shown(size)}")
+    width, height = sides
+    found = f"{width:g} x {height:g} m"
     if not (math.isfinite(width) and math.isfinite(height)):
-        raise ValueError(f"size must be finite, got {shown}")
+        raise ValueError(f"size must be finite, got {found}")
     if max(width, height) < least[0] or min(width, height) < least[1]:
         raise ValueError(
-            f"size of a random {kind} must be at least {least[0]:g} x {least[1]:g} m, got {shown}"
+            f"size of a random {kind} must be at least {least[0]:g} x {least[1]:g} m, got {found}"
         )
     if max(width, height) > _MAX_SIDE:
-        raise ValueError(f"size must be at most {_MAX_SIDE:g} m along each side, got {shown}")
+        raise ValueError(f"size must be at most {_MAX_SIDE:g} m along each side, got {found}")
     if width * height / resolution**2 > _MAX_CELLS:
         raise ValueError(
-            f"the map must have at most {_MAX_CELLS} cells, got {shown} with a resolution of "
+            f"the map must have at most {_MAX_CELLS} cells, got {found} with a resolution of "
             f"{resolution:g} m: choose a smaller size or larger cells"
         )
     return width, height

@@ -15,6 +15,7 @@ from programs import run_program
 
 # From the bottom up. A module imports only from floors below its own and from its own room.
 FLOORS = (
+    ("checks", "uncopied"),
     ("defaults", "errors", "geometry", "graph_names", "requirements", "timekeeper", "version"),
     ("controllers", "extras", "physics", "values"),
     ("config", "entities"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -43,7 +44,20 @@ def test_wrap_angle_preserves_the_direction(angle):
 
 
 @pytest.mark.parametrize(
-    "pose", [(1, 2), "abc", None, (1, 2, "x"), (1, 2, math.nan), (1, math.inf, 0)]
+    "pose",
+    [
+        (1, 2),
+        "123",
+        None,
+        (1, 2, "3"),
+        (1, 2, math.nan),
+        (1, math.inf, 0),
+        (10**400, 0, 0),
+        (1j, 0, 0),
+        (True, 0, 0),
+        {1, 2, 3},
+        np.eye(3),
+    ],
 )
 def test_finite_pose_rejects_invalid_poses(pose):
     with pytest.raises(ValueError, match="pose must be"):
@@ -51,7 +65,8 @@ def test_finite_pose_rejects_invalid_poses(pose):
 
 
 def test_finite_pose_accepts_any_sequence():
-    assert finite_pose(["1", 2, 3.5]) == (1.0, 2.0, 3.5)
+    assert finite_pose([np.int64(1), 2, 3.5]) == finite_pose(np.array([1, 2, 3.5]))
+    assert finite_pose(iter((Fraction(1, 2), 2, 3))) == (0.5, 2.0, 3.0)
 
 
 @given(poses, st.lists(st.tuples(numbers, numbers), min_size=1, max_size=5))

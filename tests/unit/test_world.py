@@ -348,7 +348,7 @@ def test_a_world_can_be_created_without_a_file(tmp_path):
         world.spawn_model("m.yaml", "m")
         world.step(3)
         assert world.time == pytest.approx(0.015)
-    with pytest.raises(ValueError, match="seed must not be negative"):
+    with pytest.raises(ValueError, match="seed must be an integer of at least 0"):
         World(seed=-1)
 
 

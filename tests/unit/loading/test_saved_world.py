@@ -97,11 +97,11 @@ def test_a_saved_world_has_the_present_maps(world: World, files: Any) -> None:
 
 
 def test_models_without_a_file_are_named(world: World, files: Any) -> None:
-    world.spawn_model("\nbodies: [{name: b, footprints: []}]", 'a "text"\nx', pose=(4, 4, 0))
+    world.spawn_model("\nbodies: [{name: b, footprints: []}]", 'a "text" x', pose=(4, 4, 0))
     again, notes = reload(files, world)
     with again:
         assert [model.name for model in again.models] == ["box", "turned"]
-    assert r'"a \"text\"\nx"' in notes[0]
+    assert r'"a \"text\" x"' in notes[0]
 
 
 @pytest.mark.parametrize(("count", "end"), [(5, '"m4". '), (6, '"m4", .... ')])

@@ -218,7 +218,7 @@ def test_too_few_places_are_an_error(files: WorldFiles) -> None:
     world.spawn_model("box.model.yaml", "box", pose=(2, 2, 0), if_blocked="allow")
     with pytest.raises(WorldError, match=r'plugin "people": no free place for "a_0" of group "a"'):
         world.randomize(1)
-    with pytest.raises(ValueError, match="seed must not be negative, got -1"):
+    with pytest.raises(ValueError, match="seed must be an integer of at least 0, got -1"):
         world.randomize(-1)
 
 

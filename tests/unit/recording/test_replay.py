@@ -103,7 +103,7 @@ def test_a_run_is_repeated_exactly(run: Path) -> None:
     assert result.last_step == 550
     kinds = [record.get("kind") for record in read_recording(run).records]
     assert kinds.count("state") == 2
-    assert kinds.count("result") == 8
+    assert kinds.count("result") == 7
     assert kinds[-1] == "end"
 
 

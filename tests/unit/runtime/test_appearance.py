@@ -147,7 +147,7 @@ INVALID = "color must be [r, g, b] or [r, g, b, a], each from 0 to 1, got "
         ({"layers": ["low", "lower"]}, "{lower} layer(s) does not exist", 'did you mean "low"?'),
         ({"layers": ["low", "3d"]}, "{3d} layer(s) does not exist", LAYERS),
         ({"layers": []}, "layers must contain at least one name", ""),
-        ({"color": [0, 0]}, INVALID + "[0.0, 0.0]", ""),
+        ({"color": [0, 0]}, INVALID + "[0, 0]", ""),
         ({"color": [0, 0, math.nan]}, INVALID + "[0.0, 0.0, nan]", ""),
         ({"color": [0, 0, 0, 1.5]}, INVALID + "[0.0, 0.0, 0.0, 1.5]", ""),
         ({"color": [0, -1, 0, 1]}, INVALID + "[0.0, -1.0, 0.0, 1.0]", ""),

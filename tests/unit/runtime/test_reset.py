@@ -288,7 +288,7 @@ def test_a_reset_that_fails_with_an_uncopyable_plugin_leaves_an_empty_world(
 def test_errors(world: World) -> None:
     with pytest.raises(WorldError, match="only a world that was loaded from a file can be reset"):
         World().reset()
-    with pytest.raises(ValueError, match="seed must not be negative, got -2"):
+    with pytest.raises(ValueError, match="seed must be an integer of at least 0, got -2"):
         world.reset(seed=-2)
     with world.clone() as clone:
         use(clone)

@@ -87,7 +87,10 @@ class TestModels:
             ({"file": "nothing.yaml"}, "File does not exist"),
             ({"file": "world.yaml"}, '"bodies"'),
             ({"name": "robot"}, '"robot"'),
-            ({"name": "a<b"}, "has a character other than"),
+            ({"name": "a\nb"}, "its name must have at most"),
+            ({"name": "../x"}, "its name must have at most"),
+            ({"name": "x" * 1000}, "its name must have at most"),
+            ({"namespace": "../x"}, "is not a legal ROS name"),
             ({"file": '{"bodies": []}'}, "the path of a model file is expected"),
         ],
     )
