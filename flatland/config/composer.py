@@ -20,7 +20,8 @@ from flatland.errors import YamlError
 _Loader: type = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _NULLS = frozenset(("", "~", "null", "Null", "NULL"))
 _NULL_TAG = "tag:yaml.org,2002:null"
-_NOT_YAML_TEXT = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+NOT_YAML_TEXT = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""A character that YAML does not allow, unless it is escaped."""
 _REPLACEMENT = "\ufffd"
 _UNDECODABLE = range(0xDC80, 0xDD00)  # the surrogates for the bytes 0x80 to 0xff
 # White space before a comment or the end of a line, preceded by list and map indicators only.
@@ -65,7 +66,7 @@ class Composer:
         self._text = text
         self._source = source
         self._inputs = inputs
-        self._invalid_indices = [match.start() for match in _NOT_YAML_TEXT.finditer(text)]
+        self._invalid_indices = [match.start() for match in NOT_YAML_TEXT.finditer(text)]
         self._roots: list[Node] = []
         self._anchors: dict[str, Node] = {}
         self._open: list[ListNode | MapNode] = []
@@ -82,7 +83,7 @@ class Composer:
         """
         text = self._text
         if self._invalid_indices:
-            text = _NOT_YAML_TEXT.sub(_REPLACEMENT, text)
+            text = NOT_YAML_TEXT.sub(_REPLACEMENT, text)
         try:
             for event in yaml.parse(_without_stray_tabs(text), Loader=_Loader):
                 self._handle(event)

@@ -31,7 +31,16 @@ _RUNTIMES = ("lupa.lua51", "lupa.luajit21", "lupa.luajit20", "lupa")
 
 
 class EvalError(Exception):
-    """The evaluation of an expression failed; the text is the Lua error message."""
+    """The evaluation of an expression failed; the text is the Lua error message.
+
+    Attributes:
+        printed: As in `EvalResult`.
+    """
+
+    def __init__(self, message: str, printed: str = "") -> None:
+        """Initializes the error."""
+        super().__init__(message)
+        self.printed = printed
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +51,12 @@ class EvalResult:
         text: The value as converted by `tostring` of Lua, empty for nil.
         unset: Unset variables and parameters that were read without a default, such as
             `env "HOME"`.
+        printed: What `print` was called with, at most 2000 bytes.
     """
 
     text: str
     unset: tuple[str, ...]
+    printed: str
 
 
 def evaluate(expression: str, param: Callable[[str], object], seed: int = 0) -> EvalResult:
@@ -68,12 +79,15 @@ def evaluate(expression: str, param: Callable[[str], object], seed: int = 0) -> 
         start = time.process_time()
         status, *rest = _run(code, params, spent, seed)
         spent += time.process_time() - start
-        texts = [_decode(text) for text in rest]
-        if status == b"value":
-            return EvalResult(texts[0], tuple(texts[1:]))
+        if status == b"param":
+            name = _decode(rest[0])
+            params += [rest[0], _lua_value(name, param(name))]
+            continue
+        text, printed, *unset = rest
+        shown = printed.decode(errors="replace")
         if status == b"error":
-            raise EvalError(texts[0])
-        params += [rest[0], _lua_value(texts[0], param(texts[0]))]
+            raise EvalError(_decode(text), shown)
+        return EvalResult(_decode(text), tuple(map(_decode, unset)), shown)
     raise EvalError(f"more than {_MAX_RUNS} parameters are read")
 
 

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from flatland.config.composer import NOT_YAML_TEXT
 from flatland.config.documents import load_documents, parse_documents
 from flatland.config.hints import is_yaml_name, similar_file
 from flatland.config.inputs import Inputs
@@ -102,8 +103,10 @@ def _first(documents: list[Node], source: Source, inputs: Inputs) -> Node:
     return documents[0]
 
 
-def _shorten(text: str) -> str:
-    return text if len(text) <= _MAX_SHOWN else text[:_MAX_SHOWN] + "..."
+def _shown(text: str) -> str:
+    """Returns a text for messages: shortened, and with escapes for characters that do not print."""
+    text = text if len(text) <= _MAX_SHOWN else text[:_MAX_SHOWN] + "..."
+    return "".join(char if char.isprintable() else repr(char)[1:-1] for char in text)
 
 
 def _is_other_yaml(file: Path, node: Node) -> bool:
@@ -188,13 +191,24 @@ class _Preprocessor:
                 raise EvalError(
                     f"all expressions together exceed the time limit of {_TOTAL_TIME_LIMIT:g} s"
                 )
+            illegal = NOT_YAML_TEXT.search(result.text)
+            if illegal:
+                code = f"U+{ord(illegal[0]):04X}"
+                raise EvalError(f"the result contains the character {code}", result.printed)
         except EvalError as error:
-            message = f'Failed to evaluate "{_shorten(expression)}", {_shorten(str(error))}'
+            self._log_printed(node, error.printed)
+            message = f'Failed to evaluate "{_shown(expression)}", {_shown(str(error))}'
             raise self._error(node, message) from error
+        self._log_printed(node, result.printed)
         place = node.source.place(node.line)
         for name in result.unset:
             self._inputs.warn(place, "%s is not set", name)
         return result.text
+
+    def _log_printed(self, node: ScalarNode, text: str) -> None:
+        if text:
+            place = node.source.place(node.line)
+            self._inputs.log.info("$eval printed: %s%s", _shown(text.rstrip("\n")), place.suffix)
 
     def _include(self, node: ScalarNode, marker: str, chain: _Chain, depth: int) -> list[Node]:
         written = node.text[len(marker) :].strip()

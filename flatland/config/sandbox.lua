@@ -2,12 +2,12 @@
 -- use are local variables, so that an expression that changes globals can neither read nor replace
 -- them.
 local code, spent, time_limit, memory_limit, interval, seed = ...
-local error, ipairs, pairs, pcall, select, tonumber, tostring, type, unpack =
-  error, ipairs, pairs, pcall, select, tonumber, tostring, type, unpack
+local error, ipairs, pairs, pcall, rawget, select, tonumber, tostring, type, unpack =
+  error, ipairs, pairs, pcall, rawget, select, tonumber, tostring, type, unpack
 local clock, getenv, sethook, memory_used = os.clock, os.getenv, debug.sethook, collectgarbage
 local loadstring, create, resume = loadstring, coroutine.create, coroutine.resume
-local byte, find, gsub, rep, sort = string.byte, string.find, string.gsub, string.rep, table.sort
-local concat, insert = table.concat, table.insert
+local byte, find, format, gsub, rep = string.byte, string.find, string.format, string.gsub, string.rep
+local sub, concat, insert, date = string.sub, table.concat, table.insert, os.date
 
 local known = {}  -- by parameter name: a table that holds the value, empty for an unset parameter
 local given = {select(7, ...)}
@@ -24,18 +24,21 @@ for _, name in ipairs{"io", "package", "require", "module", "dofile", "loadfile"
   _G[name] = nil
 end
 
+-- The hook runs every few instructions and before each function, also before those of the library:
+-- a loop of few instructions could otherwise call slow functions many times between two checks.
 -- Once `stopped` is set, functions that catch errors raise it again, so that the expression ends.
-local stopped, requested
+local stopped, requested, ended
 local start = clock() - spent
 local check
 function check()
+  if ended then return end
   if not stopped and clock() - start > time_limit then
     stopped = "the time limit of " .. time_limit .. " s is exceeded"
   elseif not stopped and memory_used("count") * 1024 > memory_limit then
     stopped = "not enough memory"
   end
   if stopped then
-    sethook(check, "", interval)  -- LuaJIT does not restart the count after an error
+    sethook(check, "c", interval)  -- LuaJIT does not restart the count after an error
     error(stopped, 0)
   end
 end
@@ -55,7 +58,7 @@ function _G.xpcall(run, handler)
 end
 function coroutine.create(run)
   local thread = create(run)
-  sethook(thread, check, "", interval)  -- hooks are set per coroutine
+  sethook(thread, check, "c", interval)  -- hooks are set per coroutine
   return thread
 end
 local create_hooked = coroutine.create
@@ -128,15 +131,24 @@ local function guard(name, plain_allowed)
       if m > 1000 then error("the pattern has more than 1000 characters", 2) end
       -- %b and %1 also scan the text; a set counts as a single character
       local bare = gsub(gsub(text_of(pattern), "%%[b%d]", "x*"), "%%.", "x")
-      bare = gsub(bare, "%[%^?.[^%]]*%]", "x")
+      local longest = 0  -- characters of a set, with each of which a character is compared
+    bare = gsub(bare, "%[%^?.[^%]]*%]", function(set)
+      if #set > longest then longest = #set end
+      return "x"
+    end)
       local _, repeated = gsub(bare, "[*+-]", "")
       local _, optional = gsub(bare, "%?", "")
       local steps = (byte(bare, 1) == 94 and 1 or n + 1) * 2 ^ optional * (1 + #bare / 8)
       for i = 1, repeated do steps = steps * (n + i) / i end
+      if longest > 16 then steps = steps * longest / 8 end
       limit(steps, "the pattern may take too long for a text of " .. n .. " characters")
     end
     if name == "gsub" and (n + 1) * #text_of(third) > memory_limit then
       error("not enough memory", 2)
+    end
+    if name == "gsub" and type(third) == "table" then
+      local values = third  -- hooks run inside a Lua function, and limit the size of the result
+      third = function(key) return values[key] end
     end
     return run(text, pattern, third, plain)
   end
@@ -148,6 +160,28 @@ function string.rep(text, count)
   if size == 0 then return "" end
   if (tonumber(count) or 0) * size > memory_limit then error("not enough memory", 2) end
   return rep(text, count)
+end
+function string.format(text, ...)
+  local size = #text_of(text)
+  for i = 1, select("#", ...) do size = size + 4 * #text_of((select(i, ...))) end  -- 4 for %q
+  if size > memory_limit then error("not enough memory", 2) end
+  return format(text, ...)
+end
+function table.concat(list, separator, first, last)
+  if type(list) == "table" then
+    local size, gap = 0, #text_of(separator)
+    for i = tonumber(first) or 1, tonumber(last) or #list do
+      local item = rawget(list, i)
+      if item == nil then break end
+      size = size + gap + (type(item) == "string" and #item or 0)
+      if size > memory_limit then error("not enough memory", 2) end
+    end
+  end
+  return concat(list, separator, first, last)
+end
+function os.date(text, time)
+  if #text_of(text) > 200 then error("the format has more than 200 characters", 2) end
+  return date(text, time)
 end
 local function is_index(number) return number > -1e9 and number < 1e9 end
 function _G.unpack(list, first, last)
@@ -165,8 +199,15 @@ function table.insert(list, ...)
   end
   return insert(list, ...)
 end
-function table.sort(list, less)
-  return sort(list, less or function(a, b) return a < b end)  -- hooks run inside a Lua function
+
+-- The terminal is not a part of the sandbox: the text is returned, and becomes a line of the log.
+local printed, room = {}, 2000  -- characters
+function _G.print(...)
+  for i = 1, select("#", ...) do
+    local text = text_of(tostring((select(i, ...)))) .. (i < select("#", ...) and "\t" or "\n")
+    if room > 0 then printed[#printed + 1] = sub(text, 1, room) end
+    room = room - #text
+  end
 end
 
 local unset, seen = {}, {}
@@ -204,19 +245,21 @@ if chunk then
   -- A hook that runs right after the expression fails in `attempt`, not here.
   local function attempt()
     ok, value = pcall(chunk)
-    sethook()
+    ended = true
   end
-  sethook(check, "", interval)
+  sethook(check, "c", interval)
   pcall(attempt)
+  ended = true
   sethook()
 end
+local function answer(status, text) return status, text, concat(printed), unpack(unset) end
 if requested then return "param", requested end
-if stopped then return "error", stopped end
+if stopped then return answer("error", stopped) end
 local kind = type(value)
-if kind == "nil" and ok then return "value", "", unpack(unset) end
+if kind == "nil" and ok then return answer("value", "") end
 if value ~= value then value = "nan" end  -- Lua 5.1 prints a sign, LuaJIT does not
 if kind == "boolean" then value = value and "true" or "false" end
 if kind == "string" or kind == "number" or kind == "boolean" then
-  return ok and "value" or "error", text_of(value), unpack(unset)
+  return answer(ok and "value" or "error", text_of(value))
 end
-return "error", ok and "the result is a " .. kind .. ", not a value" or "error of type " .. kind
+return answer("error", ok and "the result is a " .. kind .. ", not a value" or "error of type " .. kind)

@@ -177,6 +177,38 @@ def test_endless_expressions_are_stopped(
     assert failure(code) in ("the time limit of 0.01 s is exceeded", "not enough memory"), runtime
 
 
+def test_the_limits_are_checked_before_each_function(
+    runtime: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A few instructions can call slow functions, which run no instructions themselves."""
+    monkeypatch.setattr(lua, "TIME_LIMIT", 0.0)
+    for code in (
+        "os.date()",
+        "table.sort({2, 1}, rawequal)",
+        "coroutine.wrap(os.time)()",
+        "pcall(string.rep, 'x', 9)",
+    ):
+        assert failure(code) == "the time limit of 0 s is exceeded", (runtime, code)
+
+
+def test_the_format_of_a_date_is_limited(runtime: str) -> None:
+    assert "more than 200 characters" in failure("os.date(('%s'):rep(2e5))"), runtime
+    assert run("os.date('!%Y-%m-%d', 0)") == "1970-01-01", runtime
+    assert run("os.date('!*t', 0).year") == "1970", runtime
+    assert run("#os.date() > 9") == "true", runtime
+
+
+def test_printed_text_is_returned(runtime: str, capfd: pytest.CaptureFixture[str]) -> None:
+    result = evaluate("for i = 1, 2 do print('a', i, nil) end return 1", lambda _: None)
+    assert result.printed == "a\t1\tnil\na\t2\tnil\n"
+    result = evaluate("for i = 1, 1e4 do print('x', param('n')) end return 1", {"n": 5}.get)
+    assert result.printed == ("x\t5\n" * 500), runtime
+    with pytest.raises(EvalError) as caught:
+        evaluate("print('before') return error('why', 0)", lambda _: None)
+    assert (str(caught.value), caught.value.printed) == ("why", "before\n")
+    assert capfd.readouterr().out == ""
+
+
 def test_reading_parameters_does_not_reset_the_time_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lua, "TIME_LIMIT", 0.04)
     code = """
@@ -199,6 +231,11 @@ HUGE = {
     "in pcall": """while true do
         pcall(function() local s = 'x' while true do s = s .. s end end) end return 1""",
     "format": "local s = ('x'):rep(1e6) while true do s = ('%s%s%s'):format(s, s, s) end return 1",
+    "concat of one text": """local s, t = ('x'):rep(1e6), {} for i = 1, 3000 do t[i] = s end
+        return #table.concat(t)""",
+    "format of one text": """local s, t = ('x'):rep(3e6), {} for i = 1, 200 do t[i] = s end
+        return #(('%s'):rep(200)):format(unpack(t))""",
+    "gsub with a table": "return #('x'):rep(1e4):gsub('x', {x = ('y'):rep(3e6)})",
     "closures": "local t = {} while true do t[#t + 1] = function() return t end end return 1",
     "coroutines": """local t = {} while true do
         t[#t + 1] = coroutine.create(function() end) end return 1""",
@@ -261,6 +298,7 @@ def test_patterns_of_excessive_cost_are_rejected(runtime: str) -> None:
         ("('x'):rep(1e3)", "'(x*)(x*)%1%2y'"),
         ("('x'):rep(1e3)", "'[x]*[%]x]*[^]y]*[]x]*z'"),
         ("('x'):rep(1e3)", "'.-.-.-.-y'"),
+        ("('x'):rep(4e3)", "'[^' .. ('a-b'):rep(300) .. ']*y'"),
     ]
     calls = ["find({0}, {1})", "match({0}, {1})", "gsub({0}, {1}, '')", "gmatch({0}, {1})()"]
     # The calls share the estimate of the cost: each pattern with one call, and one with all.
@@ -281,6 +319,10 @@ RESULTS = [
     ("('aXb'):find('%u', 2)", "2"),
     ("('x'):rep(10000):gsub('x', '')", ""),
     ("('x'):rep(3):gsub('x', function(x) return x .. 'y' end)", "xyxyxy"),
+    ("('ab'):gsub('(a)', setmetatable({}, {__index = function(t, key) return key .. key end}))",
+     "aab"),
+    ("('%s %d %5.1f %q'):format('a', 3, 2.25, 'q')", 'a 3   2.2 "q"'),
+    ("table.concat({1, 'b', 3}, ', ', 2)", "b, 3"),
     ("('a b c'):gmatch('%a+')()", "a"),
     ("('f(a(b)c)'):match('%b()')", "(a(b)c)"),
     ("string.rep(12, 2)", "1212"),

@@ -251,6 +251,31 @@ def test_names_must_be_strings(files: Files, call: str) -> None:
     assert "requires a name, got" in files.failure(f"x: $eval {call}")
 
 
+def test_printed_text_becomes_a_line_of_the_log(
+    files: Files, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+) -> None:
+    caplog.set_level(logging.INFO, logger="flatland")
+    files.read(r"""a: $eval print("\27[31mred", 2) return 1""")
+    place = f"[{files.path('main')}:1]"
+    assert caplog.messages == [rf"$eval printed: \x1b[31mred\t2 {place}"]
+    caplog.clear()
+    text = files.failure(r"""a: $eval print("why") return error("\27[31m")""")
+    assert caplog.messages == [f"$eval printed: why {place}"]
+    assert r"$eval:1: \x1b[31m" in text
+    assert "\x1b" not in text
+    files.read("a: $eval for i = 1, 1e4 do print('long') end return 1")
+    assert len(caplog.messages[-1]) < 1000
+    assert capfd.readouterr().out == ""
+
+
+@pytest.mark.parametrize(("code", "name"), [("0", "U+0000"), ("27", "U+001B"), ("127", "U+007F")])
+def test_a_result_with_a_character_that_yaml_does_not_allow(
+    files: Files, code: str, name: str
+) -> None:
+    text = files.failure(f"a: $eval return 'x' .. string.char({code})")
+    assert f"the result contains the character {name} [" in text
+
+
 # $include
 
 
