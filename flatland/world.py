@@ -1126,6 +1126,10 @@ class OpenRecording(Protocol):
     def is_open(self) -> bool:
         """Whether the recording is being written."""
 
+    @property
+    def error(self) -> str:
+        """Why the recording ended before its end and is incomplete; empty if it did not."""
+
     def close(self) -> None:
         """Writes the last state and ends the recording; idempotent."""
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import os
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flatland.cli.contents import counted
 from flatland.extras import missing
+from flatland.output_files import replaced
 
 if TYPE_CHECKING:
     from flatland.node.message_recorder import MessageRecorder
@@ -25,19 +25,6 @@ def path_with(suffixes: Sequence[str]) -> Callable[[str], Path]:
         return Path(text)
 
     return path
-
-
-@contextmanager
-def replaced(path: Path) -> Iterator[Path]:
-    """Yields a temporary path; the file becomes `path` at the end, and is removed on an error."""
-    part = path.with_name(f"{path.stem}.part{path.suffix}")
-    try:
-        yield part
-        os.replace(part, path)  # noqa: PTH105
-    except BaseException:
-        with suppress(OSError):
-            part.unlink()
-        raise
 
 
 def recording_arguments() -> argparse.ArgumentParser:

@@ -36,8 +36,9 @@ def add(commands: Commands) -> None:
         description="Repeats a run from a recording of `flatland run --record`, of "
         "`flatland test`, of the node (record:=FILE) or of World.record, without ROS and as fast "
         "as possible, or with --view in real time. The exit code is 1 if the run differs from the "
-        "recording; the first step that differs is printed. With the folder of a report of "
-        "`flatland test`, the report is shown until Ctrl-C, and its links replay the runs.",
+        "recording, whose first step that differs is printed, or if the recording is incomplete. "
+        "With the folder of a report of `flatland test`, the report is shown until Ctrl-C, and its "
+        "links replay the runs.",
         examples=_EXAMPLES,
     )
     parser.add_argument(
@@ -145,6 +146,10 @@ def _report(replay: Replay, signal: int = 0) -> int:
         return 1
     done = time_of(counted(replay.step, "step"), replay.world.time)
     print(f"{recording.path}: {done}, no difference")
-    if recording.is_cut or recording.records[-1].get("kind") != "end":
-        print("the recording has no end: the program that wrote it was killed")
-    return 0
+    if recording.is_complete:
+        return 0
+    print(
+        "the recording is incomplete, and nothing after these steps was compared: the program that "
+        "wrote it was killed, or could not write all of it"
+    )
+    return 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 import time
 from contextlib import ExitStack
 from pathlib import Path
@@ -23,10 +24,11 @@ from flatland.cli.arguments import (
     positive,
 )
 from flatland.cli.contents import counted
-from flatland.cli.outputs import Recordings, path_with, recording_arguments, replaced
+from flatland.cli.outputs import Recordings, path_with, recording_arguments
 from flatland.cli.progress import StopSignals, progress_bar
 from flatland.drawing import VIDEO_FORMATS, FrameRenderer, VideoFile, check_matplotlib, check_opencv
 from flatland.errors import FlatlandError
+from flatland.output_files import replaced
 from flatland.runtime.plain_commands import set_command
 from flatland.world import World
 
@@ -53,7 +55,8 @@ def add(commands: Commands) -> None:
         summary="simulate a world as fast as possible, into a bag or a video",
         description="Simulates a world without ROS, as fast as possible, and optionally writes all "
         "outputs and transforms to a bag, or a video. After Ctrl-C the files contain what has been "
-        "simulated until then; after an error they are removed.",
+        "simulated until then; after an error they are removed, apart from the recording. The exit "
+        "code is 1 if a file is incomplete, for example because the disk is full.",
         examples=_EXAMPLES,
     )
     parser.add_argument(
@@ -102,8 +105,7 @@ def _run(options: argparse.Namespace) -> int:
         recordings = Recordings(options, files)
         observers = recordings.recorders.values()
         with load(options, options.seed, step_size=options.step_size, observers=observers) as world:
-            if options.record:
-                world.record(options.record)
+            recording = world.record(options.record) if options.record else None
             for topic, value in options.command:
                 set_command(world, topic, value)
             video = _Video(options, world, files) if options.video else None
@@ -115,9 +117,14 @@ def _run(options: argparse.Namespace) -> int:
             video.close()
             print(f"wrote {options.video}: {counted(video.frames, 'frame')}")
         recordings.close()
-        if options.record:
+    if recording is not None:
+        if recording.error:
+            print(f"flatland: {options.record} is incomplete: {recording.error}", file=sys.stderr)
+        else:
             print(f"wrote {options.record}")
-    return 128 + stop.signal if stop.signal else 0
+    if stop.signal:
+        return 128 + stop.signal
+    return 1 if recording is not None and recording.error else 0
 
 
 def _print_summary(world: World, wall_time: float, stop: StopSignals) -> None:

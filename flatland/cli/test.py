@@ -16,11 +16,12 @@ from flatland.errors import Place
 from flatland.scenarios.cluster import Cluster
 from flatland.scenarios.columns import FAULTS
 from flatland.scenarios.comparison import Change, Comparison, compare
-from flatland.scenarios.controllers import INCLUDED, POLICY
+from flatland.scenarios.controllers import INCLUDED, POLICY, split_names
 from flatland.scenarios.episode import Options, Result
+from flatland.scenarios.foreign import clean_name
 from flatland.scenarios.junit import write_junit
 from flatland.scenarios.report import Report, worst_first, write_report
-from flatland.scenarios.results import SuiteResults, read_results, write_results
+from flatland.scenarios.results import SuiteResults, locked, read_results, write_results
 from flatland.scenarios.scenario import Run, Scenario
 from flatland.scenarios.seeds import parse_seeds
 from flatland.scenarios.sketch import sketch
@@ -57,6 +58,8 @@ REGRESSIONS = ("any", "significant")
 
 _MEGABYTE = 1 << 20
 _MOST_CHANGES = 100  # runs from pass to fail, or back, that are printed; the report has all
+_MAX_LISTED = 5  # incomplete recordings
+_REPORT = "report.html"
 
 
 def add(commands: Commands) -> None:
@@ -81,17 +84,28 @@ def add(commands: Commands) -> None:
     parser.add_argument("--list", action="store_true", help="list the scenarios and end")
     parser.add_argument(
         "--robot",
-        default="gap",
-        metavar="CONTROLLERS",
-        help=f"names, separated by commas: {', '.join([*INCLUDED, POLICY])}, FILE.py:NAME, "
-        "MODULE:NAME, FILE.onnx, 'FILE.launch ARG:=VALUE ...', 'FILE.launch.py ARG:=VALUE ...' "
-        "(also .xml, .yaml) or 'command: PROGRAM ...' (default: gap)",
+        action="append",
+        metavar="CONTROLLER",
+        help=f"{', '.join([*INCLUDED, POLICY])}, FILE.py:NAME, MODULE:NAME, FILE.onnx, "
+        "'FILE.launch ARG:=VALUE ...', 'FILE.launch.py ARG:=VALUE ...' (also .xml, .yaml) or "
+        "'command: PROGRAM ...'; may be given several times. Names without arguments can be "
+        "separated by commas; with arguments, which are split as in a shell, commas are part of "
+        "them (default: gap)",
     )
     parser.add_argument(
-        "--seeds", type=_seeds, metavar="LIST", help="in place of those of the files: 0:20 or 1,5:9"
+        "--seeds",
+        type=_seeds,
+        action="extend",
+        metavar="LIST",
+        help="in place of those of the files: 0:20 or 1,5:9; may be given several times",
     )
     parser.add_argument(
-        "--only", default="", metavar="PATTERN", help="only scenarios whose title matches: '*door*'"
+        "--only",
+        action="append",
+        default=[],
+        metavar="PATTERN",
+        help="only scenarios with this title, or whose title matches: '*door*'; may be given "
+        "several times",
     )
     add_param(parser)
     _add_results(parser.add_argument_group("results"))
@@ -221,33 +235,42 @@ def _test(options: argparse.Namespace) -> int:
         options.parser.error("name scenario files or included suites; --list shows the latter")
     if options.working_dir is not None and options.ray is None:
         options.parser.error("--working-dir requires --ray")
-    controllers = [name.strip() for name in options.robot.split(",") if name.strip()]
+    controllers = _controllers(options.robot or ["gap"], options.working_dir or "")
     if not controllers:
         options.parser.error("--robot: must name a controller")
     scenarios = _load(options)
     if scenarios is None:
         return 1
     baseline = None if options.baseline is None else read_results(options.baseline)
-    runs = runs_of(scenarios, controllers, options.seeds)
-    with StopSignals() as stop:
-        results = _run(options, runs, stop)
-    comparisons = _comparisons(results, controllers, baseline)
-    _write(options, results, comparisons)
+    runs = runs_of(scenarios, controllers, options.seeds and tuple(dict.fromkeys(options.seeds)))
+    with locked(options.out):
+        with StopSignals() as stop:
+            results = _run(options, runs, stop)
+        names = list(map(clean_name, controllers))
+        comparisons = _comparisons(results, names, baseline)
+        incomplete = _write(options, controllers, results, comparisons)
     _print(options, results, comparisons)
+    for text in incomplete:
+        print(f"flatland: {text}", file=sys.stderr)
     if stop.signal:
         print(f"interrupted: {counted(results.missing, 'run')} missing; --continue makes them")
         return 128 + stop.signal
-    return _exit_code(options, results, comparisons)
+    return 1 if incomplete else _exit_code(options, results, comparisons)
+
+
+def _controllers(texts: Sequence[str], folder: str) -> list[str]:
+    """Returns the controllers of the values of `--robot`, each once."""
+    found = [name for text in texts for name in split_names(text, folder)]
+    return list(dict.fromkeys(found))
 
 
 def _list(options: argparse.Namespace) -> int:
     names = options.paths or included_suites()
     total = 0
-    for file in scenario_files(names):
-        for scenario in load_suite([file], dict(options.param), options.only):
-            total += len(scenario.seeds)
-            shown = f"{scenario.title}  {counted(len(scenario.seeds), 'seed')}"
-            print(f"{shown}  {scenario.description}".rstrip())
+    for scenario in load_suite(scenario_files(names), dict(options.param), options.only):
+        total += len(scenario.seeds)
+        shown = f"{scenario.title}  {counted(len(scenario.seeds), 'seed')}"
+        print(f"{shown}  {scenario.description}".rstrip())
     print(f"{counted(total, 'run')} with one controller; the included suites are in {SUITES}")
     return 0
 
@@ -345,13 +368,32 @@ def _comparisons(
 
 
 def _write(
-    options: argparse.Namespace, results: SuiteResults, comparisons: dict[str, Comparison]
-) -> None:
+    options: argparse.Namespace,
+    controllers: Sequence[str],
+    results: SuiteResults,
+    comparisons: dict[str, Comparison],
+) -> list[str]:
+    """Writes all files of results, and returns which are incomplete, with the reasons."""
     folder = options.out
-    write_results(results, folder)
-    write_junit(results, options.junit or folder / "junit.xml")
-    command = ["flatland", "test", *options.paths, "--robot", options.robot]
-    write_report(results, Report(command, comparisons), folder / "report.html")
+    command = ["flatland", "test", *options.paths]
+    command += [word for name in controllers for word in ("--robot", name)]
+    incomplete = [
+        f"{folder / result.recording} is incomplete: {result.recording_error}"
+        for result in results.results
+        if result.recording_error
+    ]
+    if len(incomplete) > _MAX_LISTED:
+        incomplete[_MAX_LISTED:] = [f"{len(incomplete) - _MAX_LISTED} more incomplete recordings"]
+    for write in (
+        lambda: write_results(results, folder),
+        lambda: write_junit(results, options.junit or folder / "junit.xml"),
+        lambda: write_report(results, Report(command, comparisons), folder / _REPORT),
+    ):
+        try:
+            write()
+        except OSError as error:
+            incomplete.append(f"not written: {error}")
+    return incomplete
 
 
 def _print(
@@ -376,7 +418,7 @@ def _print(
             print(picture)
         if worst.recording:
             print(f"flatland replay {options.out / worst.recording} --view")
-    print(f"\nreport: {options.out / 'report.html'}")
+    print(f"\nreport: {options.out / _REPORT}")
     if any(result.recording for result in results.results):
         print(f"with links that replay the runs: flatland replay {options.out} --view")
 

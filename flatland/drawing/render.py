@@ -20,6 +20,7 @@ from flatland.checks import checked_names, checked_path, checked_range
 from flatland.drawing.layout import Layout, checked_view, default_view
 from flatland.errors import FlatlandError
 from flatland.extras import missing
+from flatland.output_files import replaced
 from flatland.scene.world_scene import Scene, describe_world
 
 if TYPE_CHECKING:
@@ -156,11 +157,11 @@ def save(
     if suffix not in PICTURE_FORMATS:
         raise ValueError(f"path must end with one of {', '.join(PICTURE_FORMATS)}, got {path!r}")
     figure = make_figure(world, **options)
-    with MATPLOTLIB_LOCK:
+    with replaced(path) as part, MATPLOTLIB_LOCK:
         if suffix == ".png":
-            figure.canvas.print_png(path)
+            figure.canvas.print_png(part)
         else:
-            figure.savefig(path, format=suffix[1:])
+            figure.savefig(part, format=suffix[1:])
 
 
 def lay_out(world: World, picture: Picture) -> tuple[Scene, Layout]:

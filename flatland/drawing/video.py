@@ -17,6 +17,8 @@ _LOG = logging.getLogger("flatland")
 VIDEO_FORMATS: Final = (".mp4",)
 # H.264, which browsers play; MPEG-4 Part 2 where OpenCV was built without an encoder for it.
 _CODECS: Final = ("avc1", "mp4v")
+_BOX_HEADER: Final = 8  # bytes: length and kind of a box of an MP4 file
+_PROBE: Final = 1 << 20  # bytes
 
 
 def check_opencv() -> Any:
@@ -53,6 +55,7 @@ class VideoFile:
         with self._path.open("wb"):
             pass  # OpenCV does not say why it cannot write a file
         self.frames = 0
+        self._is_closed = False
         for self.codec in _CODECS:
             code = cv2.VideoWriter_fourcc(*self.codec)
             self._writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, fps, size)
@@ -71,8 +74,31 @@ class VideoFile:
         """Completes the file.
 
         Raises:
-            OSError: The file was not written, for example because the disk is full.
+            OSError: The file is incomplete, for example because the disk is full.
         """
+        if self._is_closed:
+            return
+        self._is_closed = True
         self._writer.release()
-        if self.frames and not self._path.stat().st_size:
-            raise OSError(f"OpenCV did not write {self._path}")
+        if self.frames and not _is_complete(self._path):
+            # OpenCV does not say why; a full disk does not take these bytes either.
+            with self._path.open("ab") as file:
+                file.write(bytes(_PROBE))
+            raise OSError(f"OpenCV did not write all of {self._path}")
+
+
+def _is_complete(path: Path) -> bool:
+    """Returns whether a file consists of whole boxes, as MP4 files do, with their index."""
+    size, place, kinds = path.stat().st_size, 0, set()
+    with path.open("rb") as file:
+        while place + _BOX_HEADER <= size:
+            file.seek(place)
+            header = file.read(2 * _BOX_HEADER)
+            length = int.from_bytes(header[:4], "big")
+            if length == 1:  # The length follows as a number of 64 bits.
+                length = int.from_bytes(header[_BOX_HEADER:], "big")
+            if length < _BOX_HEADER:
+                return False
+            kinds.add(header[4:_BOX_HEADER])
+            place += length
+    return place == size and b"moov" in kinds

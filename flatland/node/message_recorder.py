@@ -29,6 +29,7 @@ class MessageRecorder(WorldObserver):
     Attributes:
         messages: Number of messages written.
         topics: Topics with at least one message.
+        error: Why the recording has ended before its end; empty if it has not.
     """
 
     def __init__(
@@ -54,12 +55,12 @@ class MessageRecorder(WorldObserver):
         self._write_message, self._finish = write, finish
         self._ends_on_error = ends_on_error
         self._is_closed = False
-        self._has_failed = False
         self._world: World | None = None
         self._unsubscribe: dict[Output[Any], Callable[[], None]] = {}
         self._write_transforms: Callable[[Any, int], None] | None = None
         self.messages = 0
         self.topics: set[str] = set()
+        self.error = ""
 
     def close(self) -> None:
         """Ends the recording; further calls have no effect."""
@@ -127,12 +128,12 @@ class MessageRecorder(WorldObserver):
         def write(value: Any, time_ns: int) -> None:
             nonlocal count
             data = pack(value)
-            if not self._has_failed:
+            if not self.error:
                 number = count
                 self._attempt(
                     lambda: self._write_message(topic, message_type, data, time_ns, number)
                 )
-                self.messages += 1
+                self.messages += not self.error
                 self.topics.add(topic)
             count += numbered
 
@@ -151,6 +152,6 @@ class MessageRecorder(WorldObserver):
         except OSError as error:
             if not self._ends_on_error:
                 raise
-            if not self._has_failed:
-                self._has_failed = True
+            if not self.error:
+                self.error = error.strerror or str(error)
                 _LOG.error("the recording of messages ends: %s", error)

@@ -49,6 +49,7 @@ class NodeRun:
         self.stopping = threading.Event()
         self.watchdog = ShutdownWatchdog(self._stop, unregister)
         self._simulation: Simulation | None = None
+        self._has_incomplete_files = False
         self._fault_reports = FaultReports(is_fault_of_client)
         self._fault_reports.install()
         # The threads of client libraries need the GIL about a hundred times for a connection or
@@ -85,7 +86,7 @@ class NodeRun:
             simulate: The function.
 
         Returns:
-            The exit code.
+            The exit code; 1 also if a recording is incomplete.
         """
         try:
             simulate()
@@ -95,7 +96,7 @@ class NodeRun:
             return self.fail(error.text_with_hint)
         except Exception:
             return self.fail("unexpected internal error", exc_info=True)
-        return 0
+        return 1 if self._has_incomplete_files else 0
 
     def serve(
         self,
@@ -132,3 +133,6 @@ class NodeRun:
             gc.enable()
             served.run()
             ended()
+        for path, reason in served.incomplete_files.items():
+            self._has_incomplete_files = True
+            _LOG.error('"%s" is incomplete: %s', path, reason)

@@ -23,8 +23,9 @@ from flatland.world import World
 if TYPE_CHECKING:
     from flatland.node.clock import NodeClock
     from flatland.node.parameters import NodeParameters
-    from flatland.node.transport import Transport
+    from flatland.node.transport import MessageFile, Transport
     from flatland.simulation import RunResult
+    from flatland.world import OpenRecording
 
 _LOG = logging.getLogger("flatland")
 
@@ -53,6 +54,7 @@ class ServedWorld:
                 cannot be published.
         """
         self._parameters, self._transport, self._clock = parameters, transport, clock
+        self._recordings: dict[str, OpenRecording | MessageFile] = {}
         with ExitStack() as closing:  # in reverse order
             closing.callback(clock.close)
             self._bridge = Bridge(transport, clock)
@@ -70,6 +72,11 @@ class ServedWorld:
     def close(self) -> None:
         """Closes the world, its topics and the clock."""
         self._closing.close()
+
+    @property
+    def incomplete_files(self) -> dict[str, str]:
+        """Paths of recordings that are not complete, with the reasons; complete after `close`."""
+        return {path: each.error for path, each in self._recordings.items() if each.error}
 
     def run(self) -> None:
         """Steps the world until a stop is requested, or the benchmark ends."""
@@ -113,7 +120,7 @@ class ServedWorld:
         recordings = closing.enter_context(ExitStack())
         closing.callback(world.close)
         if parameters.record:
-            world.record(parameters.record)
+            self._recordings[parameters.record] = world.record(parameters.record)
             _LOG.info('recording the run to "%s"', parameters.record)
         if parameters.record_mcap:
             try:
@@ -122,6 +129,7 @@ class ServedWorld:
                 text = f'cannot create "{parameters.record_mcap}": {error.strerror}'
                 raise FlatlandError(text) from error
             _LOG.info('recording messages to "%s"', parameters.record_mcap)
+            self._recordings[parameters.record_mcap] = recorder
             recordings.callback(recorder.close)
         return world
 

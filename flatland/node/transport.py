@@ -87,6 +87,14 @@ class Connection(Protocol):
         """Unregisters the topic or service asynchronously."""
 
 
+class MessageFile(Connection, Protocol):
+    """A recording of messages that can be closed."""
+
+    @property
+    def error(self) -> str:
+        """Why the recording has ended before its end; empty if it has not."""
+
+
 class Publisher(Connection, Protocol):
     """Publishes messages without blocking.
 
@@ -399,7 +407,7 @@ class Transport(ABC):
         """Sends small messages at once from now on, at a higher cost per message."""
 
     @abstractmethod
-    def record(self, path: str, world: World) -> Connection:
+    def record(self, path: str, world: World) -> MessageFile:
         """Records all messages of a world to an MCAP file, until `close`.
 
         Errors of the file, such as a full disk, are logged and end the recording.

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import base64
 import dataclasses
+import fcntl
 import importlib
 import json
 import os
+import stat
 import zlib
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -23,6 +24,7 @@ import numpy as np
 
 from flatland.checks import checked_path
 from flatland.errors import FlatlandError
+from flatland.output_files import append
 
 FORMAT: Final = "flatland recording 1"
 
@@ -55,6 +57,25 @@ class RecordingError(FlatlandError):
     prefix = "Flatland recording: "
 
 
+class RecordingWriteError(RecordingError):
+    """A recording cannot be written.
+
+    Attributes:
+        reason: Why, without the path.
+    """
+
+    def __init__(self, what: str, path: str, cause: OSError) -> None:
+        """Initializes the error.
+
+        Args:
+            what: What was attempted, such as `write`.
+            path: The file.
+            cause: The error of the operating system.
+        """
+        self.reason = cause.strerror or str(cause)
+        super().__init__(f'cannot {what} "{path}": {self.reason}')
+
+
 class LogWriter:
     """Appends records to a file."""
 
@@ -65,33 +86,42 @@ class LogWriter:
             path: The file.
 
         Raises:
-            RecordingError: The file cannot be created.
+            RecordingWriteError: The file cannot be created, or is being written by another process.
         """
         self.path = checked_path("path", path)
         try:
-            self._file = os.open(
-                self.path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND, 0o666
-            )
+            self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
         except OSError as error:
-            raise RecordingError(f'cannot create "{self.path}": {error.strerror}') from error
+            raise RecordingWriteError("create", self.path, error) from error
+        try:
+            self._take()
+        except OSError as error:
+            self.close()
+            raise RecordingWriteError("create", self.path, error) from error
+
+    def _take(self) -> None:
+        """Empties a regular file, unless another process is writing to it."""
+        if not stat.S_ISREG(os.fstat(self._file).st_mode):
+            return
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise OSError(error.errno, "another process is writing to it") from error
+        except OSError:
+            pass  # The file system has no locks.
+        os.ftruncate(self._file, 0)
 
     def write(self, record: Record) -> None:
         """Appends a record.
 
         Raises:
-            RecordingError: The file cannot be written; the incomplete line is removed.
+            RecordingWriteError: The file cannot be written; the incomplete line is removed.
         """
         text = json.dumps(record, separators=(",", ":")).encode()
-        line = b"%08x %s\n" % (zlib.crc32(text), text)
-        size = os.fstat(self._file).st_size
         try:
-            rest = memoryview(line)
-            while rest:
-                rest = rest[os.write(self._file, rest) :]
+            append(self._file, b"%08x %s\n" % (zlib.crc32(text), text))
         except OSError as error:
-            with suppress(OSError):  # raised if this is not a regular file
-                os.ftruncate(self._file, size)
-            raise RecordingError(f'cannot write "{self.path}": {error.strerror}') from error
+            raise RecordingWriteError("write", self.path, error) from error
 
     def close(self) -> None:
         """Closes the file; idempotent."""
@@ -118,6 +148,11 @@ class Recording:
     def header(self) -> Record:
         """The first record."""
         return self.records[0]
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the recording contains the end of the run."""
+        return not self.is_cut and self.records[-1].get("kind") == "end"
 
 
 def read_recording(path: str | os.PathLike[str]) -> Recording:

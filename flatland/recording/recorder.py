@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from flatland.errors import WorldError
 from flatland.plugin_api.ports import Command
-from flatland.recording.log_file import FORMAT, LogWriter, Record, RecordingError, encode_value
+from flatland.recording.log_file import FORMAT, LogWriter, Record, RecordingWriteError, encode_value
 from flatland.runtime.observer import WorldObserver
 from flatland.timekeeper import NANOSECONDS
 from flatland.uncopied import uncopied
@@ -32,6 +32,9 @@ class Recorder(WorldObserver):
 
     If the file cannot be written, an error is logged and the recording ends; the simulation
     continues.
+
+    Attributes:
+        error: Why the recording is incomplete, with the step at which it ends; empty if it is not.
     """
 
     def __init__(self, world: World, path: str | os.PathLike[str]) -> None:
@@ -65,6 +68,7 @@ class Recorder(WorldObserver):
         self._checksums: list[int] = []
         self._next_hash_ns = NANOSECONDS
         self._unrecordable: set[str] = set()
+        self.error = ""
         self._writer: LogWriter | None = LogWriter(path)
         try:
             self._writer.write(
@@ -190,7 +194,8 @@ class Recorder(WorldObserver):
         record: Record = {"step": self._step, "kind": kind, **fields}
         try:
             self._writer.write(record)
-        except RecordingError as error:
+        except RecordingWriteError as error:
+            self.error = f"{error.reason}, at step {self._step}"
             _LOG.error("%s; the recording ends at step %d", error, self._step)
             self._stop()
 

@@ -33,7 +33,7 @@ from flatland.timekeeper import NANOSECONDS
 
 if TYPE_CHECKING:
     from flatland.node.ticker import TickerThread
-    from flatland.node.transport import Connection, ForeignTopicsConnection
+    from flatland.node.transport import Connection, ForeignTopicsConnection, MessageFile
     from flatland.runtime.requests import Post
     from flatland.simulation import Simulation
     from flatland.world import World
@@ -174,7 +174,7 @@ class Ros2Transport(Transport):
     def disable_delay(self) -> None:
         """Has no effect: DDS sends each message at once."""
 
-    def record(self, path: str, world: World) -> Connection:
+    def record(self, path: str, world: World) -> MessageFile:
         """Records all messages of a world to an MCAP file."""
         from flatland.ros2.message_recorder import record_mcap
 

@@ -19,6 +19,7 @@ from typing import Any, Final
 
 from flatland.errors import FlatlandError
 from flatland.extras import require
+from flatland.output_files import write_bytes
 from flatland.scenarios.columns import error_row
 from flatland.scenarios.episode import Result
 from flatland.scenarios.scenario import Run
@@ -157,10 +158,15 @@ def _keep(
     recordings: Recordings, batch: Sequence[Run], results: Sequence[Result], out: Path
 ) -> None:
     """Writes the recordings of other machines, and the random worlds that they refer to."""
-    for name, content in recordings.items():
-        path = out / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+    for result in results:
+        if result.recording not in recordings:
+            continue
+        path = out / result.recording
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_bytes(path, recordings[result.recording])
+        except OSError as error:
+            result.recording_error = error.strerror or str(error)
     recorded = {result.row["scenario"] for result in results if result.recording}
     for run in batch:
         if run.scenario.title in recorded:

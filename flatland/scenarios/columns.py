@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from flatland.scenarios.foreign import clean_text
+
 Row = dict[str, Any]
 """The values of one run by column; None for a missing value."""
 
@@ -108,4 +110,11 @@ def empty_row(key: tuple[str, str, int]) -> Row:
 
 def error_row(key: tuple[str, str, int], reason: str) -> Row:
     """Returns the row of a run that failed for a reason."""
-    return empty_row(key) | {"error": reason, "failures": reason}
+    return clean_row(empty_row(key) | {"error": reason, "failures": reason})
+
+
+def clean_row(row: Row) -> Row:
+    """Returns a row whose texts can be printed, encoded and stored in any format of results."""
+    return {
+        name: clean_text(value) if isinstance(value, str) else value for name, value in row.items()
+    }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import math
 import os
@@ -15,10 +16,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import FlatlandError
-from flatland.scenarios.columns import Row, empty_row
+from flatland.scenarios.columns import Row, clean_row, empty_row
 from flatland.scenarios.connection import StackError
 from flatland.scenarios.controllers import find_controller
 from flatland.scenarios.events import Events
+from flatland.scenarios.foreign import text_of, user_interrupts
 from flatland.scenarios.measures import Measures, distance_left, success_weighted_length
 from flatland.scenarios.outline import models_of, outline_of
 from flatland.scenarios.planner import PlanningError, shortest_length
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
     from flatland.scenarios.outline import Drawn, Line, Outline
     from flatland.scenarios.scenario import Run, Scenario
 
-_MAX_NAME: Final = 120  # characters of the name of a recording
+_MAX_NAME: Final = 120  # bytes of the name of a recording
 _MAX_PATH: Final = 600  # points of the path that are kept
 
 
@@ -71,6 +73,7 @@ class Result:
         recording: File of the recording, relative to the folder of the results; empty without one.
         jumps: Kidnappings (time, x, y, x, y) of the robot from one place to another [s, m].
         models: The models at the end, for pictures.
+        recording_error: Why the recording is incomplete, empty if it is not.
     """
 
     row: Row
@@ -81,6 +84,7 @@ class Result:
     recording: str = ""
     jumps: list[tuple[float, float, float, float, float]] = field(default_factory=list)
     models: list[Drawn] = field(default_factory=list)
+    recording_error: str = ""
 
     @property
     def tracks(self) -> list[Line]:
@@ -108,30 +112,30 @@ def run_scenario(
     """
     start = time.perf_counter()
     result = Result(empty_row(run.key))
-    try:
-        _run(run, options, result, begin_command)
-    except (Exception, SystemExit) as error:
-        reason = describe(error)
-        result.row |= {"outcome": "error", "success": False, "passed": False, "error": reason}
-        result.row["failures"] = reason
-        if isinstance(error, MemoryError):
-            raise  # The process is replaced.
-    finally:
-        wall_time = time.perf_counter() - start
-        result.row |= {
-            "wall_time": wall_time,
-            "worker": f"{socket.gethostname()}:{os.getpid()}",
-        }
+    with user_interrupts() as is_interrupted:
+        try:
+            _run(run, options, result, begin_command)
+        except BaseException as error:
+            if isinstance(error, KeyboardInterrupt) and is_interrupted():
+                raise
+            reason = describe(error)
+            result.row |= {"outcome": "error", "success": False, "passed": False, "error": reason}
+            result.row["failures"] = reason
+            if isinstance(error, MemoryError):
+                raise  # The process is replaced.
+    wall_time = time.perf_counter() - start
+    worker = f"{socket.gethostname()}:{os.getpid()}"
+    result.row = clean_row(result.row | {"wall_time": wall_time, "worker": worker})
     return result
 
 
 def describe(error: BaseException) -> str:
     """Returns the type, text and innermost line of code of an error."""
     if isinstance(error, FlatlandError):
-        return error.text_with_hint
+        return text_of(error, lambda known: known.text_with_hint)
     if isinstance(error, FailedRunError | PlanningError | StackError):
         return str(error)
-    text = f"{type(error).__name__}: {error}"
+    text = f"{type(error).__name__}: {text_of(error)}"
     frames = traceback.extract_tb(error.__traceback__)
     if not frames:
         return text
@@ -144,8 +148,9 @@ def recording_path(run: Run) -> str:
     The name consists of letters, digits and a few signs, and of a hash that distinguishes it.
     """
     name = "".join(c if c.isalnum() or c in "._-=" else "_" for c in run.title)
+    name = name.encode()[:_MAX_NAME].decode(errors="ignore")
     digest = hashlib.sha256(run.title.encode()).hexdigest()[:8]
-    return f"recordings/{name[:_MAX_NAME]}-{digest}.flog"
+    return f"recordings/{name}-{digest}.flog"
 
 
 def _run(
@@ -170,10 +175,10 @@ def _run(
             )
         )
         result.outline = outline_of(world)
-        recording = recording_path(run)
+        recording, recorder = recording_path(run), None
         if options.record != "none":
             (out / recording).parent.mkdir(parents=True, exist_ok=True)
-            world.record(out / recording)
+            recorder = world.record(out / recording)
         try:
             stage = prepare(world, run)
             if stack is not None:
@@ -185,8 +190,10 @@ def _run(
             if stack is not None:
                 result.row |= _validity(stack)
         finally:
-            if options.record == "all" or (options.record == "failed" and not result.row["passed"]):
-                result.recording = recording
+            if recorder is not None:
+                recorder.close()
+                if options.record == "all" or not result.row["passed"]:
+                    result.recording, result.recording_error = recording, recorder.error
     if options.record == "failed" and result.row["passed"]:
         (out / recording).unlink(missing_ok=True)
 
@@ -218,7 +225,8 @@ class _Driver:
         self.times: list[float] = []
         self._begin(True)
         try:
-            self._controller = create(stage.task)
+            # A copy: what a controller does to it has no effect on the run.
+            self._controller = create(dataclasses.replace(stage.task))
         finally:
             self._begin(False)
 
@@ -244,8 +252,9 @@ class _Driver:
         """
         count = getattr(self._controller, "recoveries", 0)
         if isinstance(count, bool) or not isinstance(count, int) or count < 0:
-            raise FailedRunError(f"recoveries of the controller must be a count, got {count!r}")
-        return count
+            shown = text_of(count, repr)
+            raise FailedRunError(f"recoveries of the controller must be a count, got {shown}")
+        return int(count)
 
     @property
     def measures(self) -> Row:
@@ -259,13 +268,15 @@ class _Driver:
             FailedRunError: It is not a twist of finite numbers.
         """
         if not isinstance(twist, Twist):
-            raise FailedRunError(f"the controller must return a flatland.Twist, got {twist!r}")
+            shown = text_of(twist, repr)
+            raise FailedRunError(f"the controller must return a flatland.Twist, got {shown}")
         try:
             vx, vy, omega = map(float, (twist.linear_x, twist.linear_y, twist.angular_z))
         except (TypeError, ValueError):
             vx = vy = omega = math.nan
         if not all(map(math.isfinite, (vx, vy, omega))):
-            raise FailedRunError(f"the controller returned a command that is not finite, {twist}")
+            shown = text_of(twist)
+            raise FailedRunError(f"the controller returned a command that is not finite, {shown}")
         speed, turn = self._stage.task.max_speed, self._stage.task.max_turn
         return Twist(
             linear_x=min(max(vx, -speed), speed),

@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Final
 
+from flatland.output_files import write_bytes
 from flatland.scenarios.columns import FAULTS
 from flatland.scenarios.results import SuiteResults
 from flatland.scenarios.summary import group_of
@@ -40,7 +41,7 @@ def write_junit(results: SuiteResults, path: Path) -> None:
         suite = ElementTree.SubElement(root, "testsuite", counts)
         suite.extend(cases)
     ElementTree.indent(root)
-    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+    write_bytes(path, ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))
 
 
 def _clean(text: str) -> str:

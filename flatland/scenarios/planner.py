@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from flatland.geometry import bounds_of
+from flatland.scenarios.views import behind
 
 if TYPE_CHECKING:
     from flatland.geometry import BoolArray, DoubleArray, Vector2
@@ -170,8 +171,9 @@ def _no_path(start: Vector2, goal: Vector2) -> str:
 
 
 def _walls(task: Task) -> list[PhysicsBody]:
-    bodies: list[PhysicsBody] = [layer.body for layer in task.world.layers]
-    for model in task.world.models:
+    world = behind(task.world)
+    bodies: list[PhysicsBody] = [layer.body for layer in world.layers]
+    for model in world.models:
         bodies += [body for body in model.bodies if body.type == "static"]
     return bodies
 
@@ -197,7 +199,8 @@ def _is_free(a: DoubleArray, b: DoubleArray, task: Task, walls: list[PhysicsBody
     count = max(2, math.ceil(math.dist(a, b) / _SIGHT) + 1)
     poses = np.zeros((count, 3))
     poses[:, :2] = np.linspace(a, b, count)
-    free = task.world.physics.free_discs(poses, task.radius, task.category_bits, only=walls)
+    physics = behind(task.world).physics
+    free = physics.free_discs(poses, task.radius, task.category_bits, only=walls)
     return bool(free.all())
 
 
@@ -229,13 +232,17 @@ class _Grid:
         """Returns the points at which the robot has a distance to all obstacles, shape (n,)."""
         task = self._task
         poses = np.column_stack((self._points, np.zeros(len(self._points))))
-        free = task.world.physics.free_discs(
-            poses,
-            task.radius + margin,
-            task.category_bits,
-            ignored=task.robot.bodies,
-            only=self._only,
-        ).reshape(self._shape)
+        free = (
+            behind(task.world)
+            .physics.free_discs(
+                poses,
+                task.radius + margin,
+                task.category_bits,
+                ignored=behind(task.robot).bodies,
+                only=self._only,
+            )
+            .reshape(self._shape)
+        )
         free[[0, -1], :] = False
         free[:, [0, -1]] = False
         return free.ravel()

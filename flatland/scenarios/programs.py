@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import re
 import signal
@@ -16,6 +17,8 @@ from typing import Final
 
 MARK: Final = "FLATLAND_RUN"
 """Variable of the environment that all processes of a run inherit."""
+_PR_SET_CHILD_SUBREAPER: Final = 36  # of linux/prctl.h
+_ENDED: Final = (b"Z", b"X")  # states of processes that have ended, but are not collected
 _LINES: Final = 8  # of the output that are kept
 _MAX_LINE: Final = 300  # characters
 _CHUNK: Final = 1 << 16  # bytes
@@ -30,29 +33,58 @@ def new_mark() -> str:
     return uuid.uuid4().hex
 
 
-def end_marked(mark: str, variable: str = MARK) -> None:
-    """Ends all processes with a mark by the signal KILL, also those that have left their group.
+def adopt_orphans() -> None:
+    """Makes this process the parent of its descendants whose own parent has ended."""
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+
+
+def end_marked(mark: str, leader: int = 0, socket: int = 0) -> None:
+    """Ends all processes of a run by the signal KILL, except for the current process.
+
+    These are the processes with a mark in their environment, those in the session of a process,
+    those that have inherited a socket from it by a fork, and all descendants of these.
 
     Args:
-        mark: Value of the variable.
-        variable: Variable of the environment that the processes have inherited.
+        mark: Value of `MARK`, which programs inherit.
+        leader: The process that leads their session, and is ended as well; 0 for none.
+        socket: Inode of the socket; 0 for none.
     """
-    wanted = f"{variable}={mark}".encode()
     # A process may start another one meanwhile.
-    while processes := _marked(wanted):
+    while processes := _processes_of(f"{MARK}={mark}".encode(), leader, f"socket:[{socket}]"):
         for process in processes:
             with contextlib.suppress(OSError):
                 os.kill(process, signal.SIGKILL)
 
 
-def _marked(wanted: bytes) -> list[int]:
-    found = []
+def _processes_of(wanted: bytes, leader: int, socket: str) -> set[int]:
+    parents: dict[int, int] = {}
+    found = set()
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
-            # The environment of a process that has ended, but is not collected, is empty.
-            if wanted in (folder / "environ").read_bytes().split(b"\0"):
-                found.append(int(folder.name))
-    return found
+            # After the name in parentheses, which may contain anything.
+            status = (folder / "stat").read_bytes().rpartition(b")")[2].split()
+            state, process = status[0], int(folder.name)
+            if state in _ENDED:
+                continue
+            parents[process], session = int(status[1]), int(status[3])
+            if (
+                (leader and leader in (process, session))
+                or wanted in (folder / "environ").read_bytes().split(b"\0")
+                or _has_inherited(folder, socket)
+            ):
+                found.add(process)
+    new = found
+    while new:
+        new = {process for process, parent in parents.items() if parent in new} - found
+        found |= new
+    return found - {os.getpid()}
+
+
+def _has_inherited(folder: Path, socket: str) -> bool:
+    """Returns whether a process executes the program of this one, and has a socket."""
+    if (folder / "exe").readlink() != Path("/proc/self/exe").readlink():
+        return False
+    return any(file.readlink().name == socket for file in (folder / "fd").iterdir())
 
 
 class Program:

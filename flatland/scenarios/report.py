@@ -11,6 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
+from flatland.output_files import write_text
 from flatland.scenarios.columns import COLUMNS, FAULTS, Row
 from flatland.scenarios.comparison import Change, Comparison
 from flatland.scenarios.episode import Result
@@ -75,7 +76,7 @@ def write_report(results: SuiteResults, report: Report, path: Path) -> None:
         f"<title>flatland test</title><style>{style}</style></head>\n"
         f"<body><main>{chr(10).join(filter(None, body))}</main></body></html>\n"
     )
-    path.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def worst_first(results: Iterable[Result]) -> list[Result]:

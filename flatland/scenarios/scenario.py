@@ -8,6 +8,7 @@ from typing import Any, Final, Literal
 
 from flatland.geometry import Bounds, Pose, Vector2
 from flatland.scenarios.conditions import Condition
+from flatland.scenarios.foreign import clean_name
 
 Fault = Literal["blind", "frozen"]
 FAULTS: Final[tuple[Fault, ...]] = ("blind", "frozen")
@@ -197,7 +198,7 @@ class Scenario:
     def title(self) -> str:
         """Name with the values of the matrix, such as `office/tour[speed=0.5]`."""
         values = ",".join(f"{name.lstrip('.')}={text}" for name, text in self.variant.items())
-        return f"{self.name}[{values}]" if values else self.name
+        return clean_name(f"{self.name}[{values}]" if values else self.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,9 +218,10 @@ class Run:
     @property
     def key(self) -> tuple[str, str, int]:
         """What identifies the run: title of the scenario, controller and seed."""
-        return (self.scenario.title, self.controller, self.seed)
+        return (self.scenario.title, clean_name(self.controller), self.seed)
 
     @property
     def title(self) -> str:
         """The key as a text."""
-        return f"{self.scenario.title} {self.controller} seed {self.seed}"
+        scenario, controller, seed = self.key
+        return f"{scenario} {controller} seed {seed}"

@@ -34,8 +34,11 @@ _WARM_UP: Final = 1.0  # s; the ROS time of the start is a multiple of it
 _PATIENCE: Final = 1.0  # wall time that a stack which has sent its last command may need [s]
 _WATCHDOG: Final = 1.0  # simulated time without commands after which the robot stops [s]
 _SILENCE: Final = 10.0  # simulated time without commands after which the stack has failed [s]
-_MAX_COMMANDS: Final = 200  # per second of simulated time
-_MANY_COMMANDS: Final = 100  # per second of simulated time; more may be many more
+_PERIODS: Final = 2  # without commands before the robot stops, if they are longer than that time
+# Sensors without an `update_rate` publish in each step. Several nodes may send one or more commands
+# for each message, and those that have waited in a queue arrive together.
+_MAX_COMMANDS: Final = 10  # per step
+_MANY_COMMANDS: Final = 5  # per step; more may be many more
 _LEAST_RATE: Final = 0.95  # simulated time per wall time that counts as real time
 _TF_DELAY: Final = 0.5  # simulated time until the transforms of a time have usually arrived [s]
 _TF_LIMIT: Final = KEPT - 1.0  # simulated time after which they are not awaited any longer [s]
@@ -149,7 +152,7 @@ class Stack:
         # Not before: the awaited command would be that to the old or to the new goal by chance.
         if goal != self._goal:
             self._send_goal(pose, goal)
-        self._check_count(count, stage.task.period)
+        self._check_count(count)
         now = stage.time
         if count:
             self._twist, self._last_command, self._has_driven = twist, now, True
@@ -157,7 +160,7 @@ class Stack:
             self._late += 1
         if self._link.given_up:
             raise GaveUpError(self._link.given_up)
-        if count > _MANY_COMMANDS * stage.task.period and self._options.pace == "lockstep":
+        if count > _MANY_COMMANDS * self._steps_per_period and self._options.pace == "lockstep":
             # In real time, so that those which wait to be received are counted as well.
             time.sleep(stage.task.period)
         silent_for = now - self._last_command
@@ -165,7 +168,8 @@ class Stack:
             kind = GaveUpError if self._has_driven else StackError
             raise kind(f"the stack sent no command for {_SILENCE:g} s{self._log()}")
         self._is_silent = not count
-        return Twist() if silent_for > _WATCHDOG else self._twist
+        patience = max(_WATCHDOG, _PERIODS * stage.task.period)
+        return Twist() if silent_for > patience else self._twist
 
     @property
     def values(self) -> dict[str, Any]:
@@ -242,12 +246,20 @@ class Stack:
             how = f"signal {-code}" if code < 0 else f"exit code {code}"
             raise StackError(f"the program has ended with {how}{self._log()}")
 
-    def _check_count(self, count: int, period: float) -> None:
+    @property
+    def _steps_per_period(self) -> float:
+        stage = self._require_stage()
+        return stage.task.period / stage.world.timekeeper.step_size
+
+    def _check_count(self, count: int) -> None:
+        """Adds the commands of a period to those of the last second."""
+        periods = max(1, round(1.0 / self._require_stage().task.period))
         self._counts.append(count)
-        if len(self._counts) > max(1, round(1.0 / period)):
+        if len(self._counts) > periods:
             self._counts.popleft()
-        if sum(self._counts) > _MAX_COMMANDS:
-            raise StackError(f"the stack sent more than {_MAX_COMMANDS} commands per second")
+        if sum(self._counts) > _MAX_COMMANDS * self._steps_per_period * periods:
+            most = _MAX_COMMANDS / self._require_stage().world.timekeeper.step_size
+            raise StackError(f"the stack sent more than {most:g} commands per second")
 
     def _log(self) -> str:
         lines = "" if self._program is None else self._program.last_lines

@@ -16,6 +16,7 @@ from flatland.plugins.pedestrians import Pedestrians
 from flatland.scenarios.scenario import GeneratedWorld, RandomPlace
 from flatland.scenarios.sensing import LaserReader
 from flatland.scenarios.task import Task
+from flatland.scenarios.views import view_of
 
 if TYPE_CHECKING:
     from flatland.entities.model import Model
@@ -42,6 +43,7 @@ class Stage:
         world: The world.
         laser: The scans of the robot.
         drive: Its velocity command.
+        robot: The robot.
         task: What the controller has to do.
         start: Initial pose of the robot [m, rad].
         people: The plugin of people, None without one.
@@ -51,6 +53,7 @@ class Stage:
     world: World
     laser: LaserReader
     drive: CommandTopic[object]
+    robot: Model
     task: Task
     start: Pose
     people: Pedestrians | None
@@ -60,11 +63,6 @@ class Stage:
     def time(self) -> float:
         """Simulated time since the start of the run [s]."""
         return self.world.time - self.start_time
-
-    @property
-    def robot(self) -> Model:
-        """The robot."""
-        return self.task.robot
 
 
 def prepare(world: World, run: Run) -> Stage:
@@ -94,8 +92,8 @@ def prepare(world: World, run: Run) -> Stage:
         if people is not None:
             people.spawn(entry.group or None, entry.count, entry.poses or None)
     task = Task(
-        world=world,
-        robot=robot,
+        world=view_of(world),
+        robot=view_of(robot),
         radius=radius,
         category_bits=bits,
         goals=places.goals(scenario, start),
@@ -105,7 +103,8 @@ def prepare(world: World, run: Run) -> Stage:
         rng=generator(run.seed, "controller"),
     )
     drive = world.command(drive_topic(robot, wanted))
-    return Stage(world, LaserReader(world, robot, laser), drive, task, start, people, world.time)
+    reader = LaserReader(world, robot, laser)
+    return Stage(world, reader, drive, robot, task, start, people, world.time)
 
 
 def drive_topic(robot: Model, wanted: Robot) -> str:

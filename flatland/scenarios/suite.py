@@ -16,7 +16,7 @@ from flatland.errors import FlatlandError
 from flatland.scenarios.controllers import controller_digest, is_stack
 from flatland.scenarios.episode import Options, Result
 from flatland.scenarios.reader import is_scenario_file, read_scenarios
-from flatland.scenarios.results import Journal, SuiteResults, key_of
+from flatland.scenarios.results import Journal, ResultsError, SuiteResults, key_of
 from flatland.scenarios.scenario import Run, Scenario
 from flatland.scenarios.workers import WorkerLimits, run_in_processes
 from flatland.version import VERSION
@@ -65,7 +65,7 @@ def scenario_files(names: Iterable[str]) -> list[Path]:
 def load_suite(
     files: Iterable[Path],
     params: Mapping[str, object] | None = None,
-    pattern: str = "",
+    pattern: str | Sequence[str] = "",
     read: ReadYaml = read_yaml,
 ) -> list[Scenario]:
     """Reads scenario files.
@@ -73,7 +73,8 @@ def load_suite(
     Args:
         files: The files.
         params: Values of `param()` in YAML files.
-        pattern: Only scenarios with matching titles, such as `*tour*`; empty for all of them.
+        pattern: Only scenarios with this title, or with a matching one, such as `*tour*`, or
+            several patterns; empty for all scenarios.
         read: Loads a file, see `read_scenarios`.
 
     Raises:
@@ -82,10 +83,21 @@ def load_suite(
     scenarios = [one for file in files for one in read_scenarios(file, params, read)]
     if not pattern:
         return scenarios
-    wanted = [one for one in scenarios if fnmatch.fnmatchcase(one.title, pattern)]
-    if scenarios and not wanted:
-        raise SuiteError(f"no scenario has a title that matches {pattern!r}")
-    return wanted
+    patterns = [pattern] if isinstance(pattern, str) else pattern
+    wanted: dict[str, list[Scenario]] = {
+        each: [
+            one
+            for one in scenarios
+            # The values of a matrix are in brackets, which are a set of characters in a pattern.
+            if one.title == each or fnmatch.fnmatchcase(one.title, each)
+        ]
+        for each in patterns
+    }
+    for each, found in wanted.items():
+        if scenarios and not found:
+            raise SuiteError(f"no scenario has a title that matches {each!r}")
+    titles = {one.title for found in wanted.values() for one in found}
+    return [one for one in scenarios if one.title in titles]
 
 
 def runs_of(
@@ -114,7 +126,8 @@ def definition_of(runs: Sequence[Run], options: Options) -> str:
     """
     digest = hashlib.sha256(VERSION.encode())
     for name in dict.fromkeys(run.controller for run in runs):
-        digest.update(f"{name} {controller_digest(name, options.folder)}\n".encode())
+        known = f"{name} {controller_digest(name, options.folder)}\n"
+        digest.update(known.encode(errors="surrogatepass"))
         if is_stack(name):
             digest.update(f"{options.stack!r}\n".encode())
     for run in runs:
@@ -183,9 +196,11 @@ def run_suite(
     folder = Path(plan.options.out)
     journal = Journal(folder, definition_of(runs, plan.options), continues=plan.continues)
     try:
+        done = {key_of(row) for row in journal.results.rows}
+        if not done <= order.keys():
+            raise ResultsError(f"{folder} has results of runs that are not part of this suite")
         for result in journal.results.results:
             on_result(result)
-        done = {key_of(row) for row in journal.results.rows}
         missing = [run for run in runs if run.key not in done]
         for result in distribute(missing, plan, is_stopped):
             journal.add(result)

@@ -2,8 +2,9 @@
 
 A controller is a class with two methods:
 
-- `__init__(self, task)`, called once per run with a `Task`. It may look at the world, for example
-  to plan a path, but must not change it.
+- `__init__(self, task)`, called once per run with a `Task`. Its world and robot are views
+  (`flatland.scenarios.views`), by which a controller can query them, for example to plan a path,
+  but cannot change them: an attempt raises a `ViewError`, and the run is an error.
 - `command(self, scan, pose, goal)`, called once per period with the current `Scan`, the true pose
   (x, y, theta) of the robot and the current goal (x, y), both in the world frame [m, rad]. It
   returns a `flatland.Twist`: linear_x and linear_y [m/s] and angular_z [rad/s] of the robot.
@@ -23,10 +24,9 @@ from typing import TYPE_CHECKING, Protocol
 if TYPE_CHECKING:
     import numpy as np
 
-    from flatland.entities.model import Model
     from flatland.geometry import DoubleArray, Pose, Vector2
+    from flatland.scenarios.views import ModelView, WorldView
     from flatland.values import Twist
-    from flatland.world import World
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +34,8 @@ class Task:
     """What a controller has to do, and with which robot.
 
     Attributes:
-        world: The world; only for queries.
-        robot: The model to be driven.
+        world: The world, for queries.
+        robot: The model to be driven, for queries.
         radius: Radius of the circle about the origin of the robot that contains it [m].
         category_bits: Categories of the obstacles that the robot collides with.
         goals: Goals (x, y) in the world frame [m].
@@ -45,8 +45,8 @@ class Task:
         rng: Random numbers that derive from the seed of the run.
     """
 
-    world: World
-    robot: Model
+    world: WorldView
+    robot: ModelView
     radius: float
     category_bits: int
     goals: tuple[Vector2, ...]

@@ -20,8 +20,9 @@ from typing import Any, Final
 from flatland.scenarios.columns import error_row
 from flatland.scenarios.controllers import is_stack
 from flatland.scenarios.episode import Options, Result, recording_path, run_scenario
-from flatland.scenarios.programs import MARK, end_marked, new_mark
+from flatland.scenarios.programs import MARK, adopt_orphans, end_marked, new_mark
 from flatland.scenarios.scenario import Run
+from flatland.scenarios.stack_options import StackOptions
 
 MAX_ATTEMPTS: Final = 3
 _CONTEXT: Final = multiprocessing.get_context("spawn")  # a fork could inherit a locked lock
@@ -36,7 +37,8 @@ class WorkerLimits:
 
     Attributes:
         command_time: Wall time of one call of a controller [s].
-        run_time: Wall time of a run [s].
+        run_time: Wall time of a run [s]. For ROS nodes, the time in which they start is not part of
+            it, and in real time neither is the simulated time.
         memory: Memory of a worker process in addition to that at its start [bytes].
         shows_output: Whether what a controller prints is shown.
     """
@@ -51,6 +53,19 @@ _STARTED: Final = "started"
 """Message of a worker that begins a run, so that its own start is not part of the run."""
 
 
+def waits_of(run: Run, stack: StackOptions) -> tuple[float, float]:
+    """Returns the wall time for which a call and a run may wait in addition to their limits [s].
+
+    Nodes may take some time to start, and with the pace of real time, a simulated second takes a
+    second.
+    """
+    if not is_stack(run.controller):
+        return 0.0, 0.0
+    if stack.pace == "lockstep":
+        return 0.0, stack.start_time
+    return run.scenario.robot.period, stack.start_time + run.scenario.limits.time
+
+
 class _Worker:
     """A process that carries out one run at a time.
 
@@ -63,20 +78,24 @@ class _Worker:
         self.connection, theirs = _CONTEXT.Pipe()
         self._mark = new_mark()
         self._limits = limits
+        self._stack = options.stack
         # Start of the current call of a controller, 0 outside of calls [s].
         self._began = _CONTEXT.Value("d", 0.0, lock=False)
         self._process = _CONTEXT.Process(
             target=_work, args=(theirs, self._began, options, limits, self._mark), daemon=True
         )
         self._process.start()
+        self._socket = os.fstat(theirs.fileno()).st_ino  # Forks by the controller inherit it.
         theirs.close()
         self.run: int | None = None
         self._started = 0.0
+        self._waits = (0.0, 0.0)  # Wall time of a call and a run that is not the controller's [s].
 
     def start(self, index: int, run: Run) -> None:
         """Begins a run."""
         self.run = index
         self._started = 0.0
+        self._waits = waits_of(run, self._stack)
         with contextlib.suppress(OSError):  # The process has ended, which `receive` reports.
             self.connection.send(run)
 
@@ -100,19 +119,28 @@ class _Worker:
         """Returns the limit that the run has exceeded, empty for none."""
         if self.run is None or not self._started:
             return ""
-        now, began, limits = time.monotonic(), self._began.value, self._limits
-        if began and now - began > limits.command_time:
-            return f"a call of the controller took more than {limits.command_time:g} s of wall time"
-        if now - self._started > limits.run_time:
-            return f"the run took more than {limits.run_time:g} s of wall time"
+        now, began = time.monotonic(), self._began.value
+        command_time = self._limits.command_time + self._waits[0]
+        run_time = self._limits.run_time + self._waits[1]
+        if began and now - began > command_time:
+            return f"a call of the controller took more than {command_time:g} s of wall time"
+        if now - self._started > run_time:
+            return f"the run took more than {run_time:g} s of wall time"
         return ""
 
+    @property
+    def has_ended(self) -> bool:
+        """Whether the process has ended, and left no message.
+
+        The connection of a process that has ended is not at its end while a child of the process
+        has inherited it.
+        """
+        return self._process.exitcode is not None and not self.connection.poll()
+
     def end(self) -> str:
-        """Ends the process unless it has ended, and returns how it ended."""
-        self._process.join(_CHECK_PERIOD if self.connection.closed else 0)
-        self._process.kill()
+        """Ends the process and all that it started, and returns how the process ended."""
+        end_marked(self._mark, self._process.pid or 0, self._socket)
         self._process.join()
-        end_marked(self._mark)
         self.connection.close()
         code = self._process.exitcode or 0
         return f"signal {-code}" if code < 0 else f"exit code {code}"
@@ -145,7 +173,12 @@ class _Pool:
                 worker.start(index, self._runs[index])
         ready = wait([worker.connection for worker in self._workers], _CHECK_PERIOD)
         for number, worker in enumerate(self._workers):
-            result = self._receive(number) if worker.connection in ready else self._check(number)
+            if worker.connection in ready:
+                result = self._receive(number)
+            elif worker.has_ended:
+                result = self._replace_ended(number)
+            else:
+                result = self._check(number)
             if result is not None:
                 yield result
 
@@ -237,8 +270,11 @@ def _work(
 ) -> None:
     """Carries out the runs that are received, until the main process ends."""
     _prepare(limits, mark)
+    process = os.getpid()
 
     def begin_command(is_begin: bool) -> None:
+        if os.getpid() != process:
+            os._exit(0)  # A fork by the controller, which must not continue the run as well.
         began.value = time.monotonic() if is_begin else 0.0
 
     while True:
@@ -259,6 +295,8 @@ def _prepare(limits: WorkerLimits, mark: str) -> None:
     """Leaves Ctrl-C to the main process, ends together with it, and limits the memory."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ[MARK] = mark
+    os.setsid()
+    adopt_orphans()
     logging.getLogger("flatland").setLevel(logging.ERROR)
     if not limits.shows_output:
         null_device = os.open(os.devnull, os.O_WRONLY)
@@ -275,7 +313,7 @@ def _prepare(limits: WorkerLimits, mark: str) -> None:
 
         def end_with_parent() -> None:
             parent.join()
-            end_marked(mark)
+            end_marked(mark, os.getpid())
             os._exit(1)
 
         threading.Thread(target=end_with_parent, daemon=True).start()

@@ -9,6 +9,7 @@ import argparse
 import math
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from flatland.extras import require
 from flatland.geometry import DoubleArray, Pose
 from flatland.maps.grey_image import GreyImage, read_grey_image
 from flatland.maps.map_image import threshold_in_place
+from flatland.output_files import replaced
 from flatland.tools.wall_segments import find_wall_segments
 
 IMAGE_SCALES = {"low": 1.05, "med": 1.5, "high": 2.0}
@@ -96,7 +98,8 @@ def find_segments(image_map: ImageMap, detail: str) -> DoubleArray:
 
 def write_data(path: Path, segments: DoubleArray) -> None:
     """Writes the data file, one segment per line."""
-    np.savetxt(path, segments, fmt="%.3f")
+    with path.open("wb") as file:
+        np.savetxt(file, segments, fmt="%.3f")
 
 
 def write_map(path: Path, data_name: str, image_map: ImageMap) -> None:
@@ -123,8 +126,10 @@ def write_overlay(path: Path, segments: DoubleArray, image: GreyImage) -> None:
         ends = np.array([[x1, len(image) - y1], [x2, len(image) - y2]]) - 0.5
         start, end = np.rint(ends * 2**_SUBPIXEL_BITS).astype(int).tolist()
         cv2.line(overlay, start, end, _LINE_COLOR, 1, cv2.LINE_AA, _SUBPIXEL_BITS)
-    if not cv2.imwrite(str(path), overlay):
+    is_encoded, data = cv2.imencode(path.suffix, overlay)
+    if not is_encoded:
         raise OSError(f"OpenCV cannot write {path}")
+    path.write_bytes(data.tobytes())
 
 
 def convert(
@@ -160,10 +165,12 @@ def convert(
     segments = find_segments(image_map, detail)
     if not len(segments):
         raise MapFileError(f'No line segments found in "{image_map.image_path}"')
-    write_data(data_file, segments)
-    write_map(map_file, data_file.name, image_map)
-    if overlay:
-        write_overlay(overlay_file, segments, image_map.image)
+    with ExitStack() as files:
+        map_part, data_part, *overlay_parts = (files.enter_context(replaced(p)) for p in outputs)
+        write_data(data_part, segments)
+        write_map(map_part, data_file.name, image_map)
+        for part in overlay_parts:
+            write_overlay(part, segments, image_map.image)
     print(f"Wrote {', '.join(map(str, outputs))}: {len(segments)} line segments")
 
 

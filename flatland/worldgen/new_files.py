@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from flatland.output_files import named_errors
+
 _SUFFIX = ".in"
 
 
@@ -52,7 +54,8 @@ def write_new(target: Path, files: Mapping[str, bytes], member: str = "") -> Non
         for name, data in files.items():
             path = content / name
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(data)
+            with named_errors(target if name == member else target / name, path):
+                path.write_bytes(data)
         os.rename(content / member, target)  # noqa: PTH104
 
 

@@ -16,7 +16,16 @@ from programs import run_program
 # From the bottom up. A module imports only from floors below its own and from its own room.
 FLOORS = (
     ("checks", "uncopied"),
-    ("defaults", "errors", "geometry", "graph_names", "requirements", "timekeeper", "version"),
+    (
+        "defaults",
+        "errors",
+        "geometry",
+        "graph_names",
+        "output_files",
+        "requirements",
+        "timekeeper",
+        "version",
+    ),
     ("controllers", "extras", "physics", "values"),
     ("config", "entities"),
     ("copying", "maps", "plugin_api"),

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from flatland.node.adapters.writer import Writer
     from flatland.node.handles import Handles, HandleServer
     from flatland.node.ticker import TickerThread
-    from flatland.node.transport import Connection, ForeignTopicsConnection
+    from flatland.node.transport import Connection, ForeignTopicsConnection, MessageFile
     from flatland.runtime.requests import Post
     from flatland.simulation import Simulation
     from flatland.world import World
@@ -157,7 +157,7 @@ class RosTransport(Transport):
         for outbox in open_outboxes():
             outbox.disable_delay()
 
-    def record(self, path: str, world: World) -> Connection:
+    def record(self, path: str, world: World) -> MessageFile:
         """Records all messages of a world to an MCAP file."""
         from flatland.ros.message_recorder import record_mcap
 

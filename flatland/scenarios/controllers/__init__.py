@@ -20,6 +20,7 @@ from flatland.scenarios.controllers.dynamic_window import DynamicWindow
 from flatland.scenarios.controllers.pursuit import PurePursuit
 from flatland.scenarios.controllers.random_walk import RandomWalk
 from flatland.scenarios.controllers.reactive import Gap, Straight
+from flatland.scenarios.foreign import text_of, user_interrupts
 from flatland.scenarios.stack_options import RosVersion, StackCommand
 
 if TYPE_CHECKING:
@@ -78,6 +79,16 @@ def find_controller(name: str, folder: str) -> Callable[[Task], Any] | StackComm
     Raises:
         ControllerError: It does not exist or is not a controller.
     """
+    try:
+        return _find(name, folder)
+    except ControllerError as error:
+        if "," not in name or name.startswith(_COMMAND):
+            raise
+        hint = "commas separate only names without arguments; give --robot once for each controller"
+        raise ControllerError(error.message, hint=hint) from error
+
+
+def _find(name: str, folder: str) -> Callable[[Task], Any] | StackCommand:
     included = INCLUDED.get(name)
     if included is not None:
         return included
@@ -93,20 +104,23 @@ def find_controller(name: str, folder: str) -> Callable[[Task], Any] | StackComm
             "given as FILE.py:NAME, MODULE:NAME, FILE.onnx, 'FILE.launch ARGUMENTS', "
             "'FILE.launch.py ARGUMENTS' or 'command: PROGRAM ARGUMENTS'"
         )
-    try:
-        if module_name.endswith(".py"):
-            module = _load_file(Path(folder, module_name).expanduser())
-        else:
-            if str(Path(folder).absolute()) not in sys.path:
-                sys.path.append(str(Path(folder).absolute()))
-            module = importlib.import_module(module_name)
-    except ControllerError:
-        raise
-    except (Exception, SystemExit) as error:
-        raise ControllerError(
-            f"{name!r}: {type(error).__name__}: {error}, while it was imported"
-        ) from error
-    found: Any = getattr(module, attribute, None)
+    with user_interrupts() as is_interrupted:
+        try:
+            if module_name.endswith(".py"):
+                module = _load_file(Path(folder, module_name).expanduser())
+            else:
+                if str(Path(folder).absolute()) not in sys.path:
+                    sys.path.append(str(Path(folder).absolute()))
+                module = importlib.import_module(module_name)
+            found: Any = getattr(module, attribute, None)
+        except ControllerError:
+            raise
+        except BaseException as error:
+            if isinstance(error, KeyboardInterrupt) and is_interrupted():
+                raise
+            raise ControllerError(
+                f"{name!r}: {type(error).__name__}: {text_of(error)}, while it was imported"
+            ) from error
     if isinstance(found, type) and callable(getattr(found, "command", None)):
         return found
     if callable(found) and not isinstance(found, type):
@@ -117,9 +131,36 @@ def find_controller(name: str, folder: str) -> Callable[[Task], Any] | StackComm
     )
 
 
+def split_names(text: str, folder: str) -> list[str]:
+    """Returns the controllers of a text in which commas may separate names.
+
+    A program or a launch file with arguments is one controller, and keeps its commas; so does the
+    path of an existing file.
+
+    Args:
+        text: The text, such as `gap,my.py:Mine` or `stack.launch topics:=[a,b]`.
+        folder: Folder that relative paths start from; empty for the current one.
+    """
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    whole = text.strip()
+    has_arguments = whole.startswith(_COMMAND) or any(len(name.split()) > 1 for name in names)
+    paths = [path for path in (whole, whole.rpartition(":")[0]) if "," in path]
+    # Not `Path.is_file`, which raises an error if a list of names is too long for a path.
+    is_file = any(os.path.isfile(Path(folder, path)) for path in paths)  # noqa: PTH113
+    return [whole] if has_arguments or is_file else names
+
+
 def is_stack(name: str) -> bool:
     """Returns whether a controller consists of ROS nodes."""
-    return name.startswith(_COMMAND) or _version_of_file(name.split(" ", 1)[0]) is not None
+    return name.startswith(_COMMAND) or _version_of_file(_first_word(name)) is not None
+
+
+def _first_word(name: str) -> str:
+    """Returns the file of a controller with arguments, which are quoted as in a shell."""
+    try:
+        return next(iter(shlex.split(name)), "")
+    except ValueError:
+        return name.split(" ", 1)[0]
 
 
 def _version_of_file(name: str) -> RosVersion | None:
