@@ -7,7 +7,7 @@ import dataclasses
 import json
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +20,8 @@ from flatland.errors import FlatlandError, Place
 from flatland.loading.model_check import is_model_file, load_model_alone
 from flatland.loading.world_loader import load_world
 from flatland.loading.world_source import WorldSource
-from flatland.scenarios.reader import is_scenario_file, read_scenarios
+from flatland.scenarios.fit import check_fit
+from flatland.scenarios.reader import Entry, is_scenario_file, read_entries
 from flatland.scenarios.scenario import Scenario
 from flatland.world import World
 
@@ -124,17 +125,33 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _check_scenarios(options: argparse.Namespace, params: dict[str, object]) -> int:
-    root = Place(str(options.path))
-    collector = ErrorCollector()
-    scenarios: list[Scenario] = []
-    with _collected_warnings(collector, root) as problems, collector.at(root):
-        scenarios = read_scenarios(options.path, params, collector.read)
-    problems[:0] = _errors_of(collector, root)
+    scenarios, problems = check_scenarios(options.path, params)
     _print_problems(options, "scenario", problems)
-    if not collector.errors and not options.json:
+    if not options.json and all(problem.severity != "error" for problem in problems):
         runs = sum(len(scenario.seeds) for scenario in scenarios)
         print(f"{counted(len(scenarios), 'scenario')}, {counted(runs, 'run')} of each controller")
     return _exit_code(options, problems)
+
+
+def check_scenarios(
+    path: Path, params: Mapping[str, object], seeds: Sequence[int] | None = None
+) -> tuple[list[Scenario], list[Problem]]:
+    """Returns the scenarios of a file, and its problems and those of its worlds and models.
+
+    Args:
+        path: The file.
+        params: Values of `param()` in YAML files.
+        seeds: Seeds in place of those of the scenarios.
+    """
+    root = Place(str(path))
+    collector = ErrorCollector()
+    entries: list[Entry] = []
+    with _collected_warnings(collector, root) as problems, collector.at(root):
+        entries = read_entries(path, params, collector.read)
+        if not collector.errors:
+            check_fit(entries, collector, seeds)
+    problems[:0] = _errors_of(collector, root)
+    return [entry.scenario for entry in entries], problems
 
 
 def _errors_of(collector: ErrorCollector, root: Place) -> list[Problem]:

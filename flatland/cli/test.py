@@ -8,11 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from flatland.cli.arguments import Commands, add_command, add_param, count, positive
-from flatland.cli.check import Problem
+from flatland.cli.check import check_scenarios
 from flatland.cli.contents import counted
 from flatland.cli.progress import StopSignals, counting_bar
-from flatland.config.collecting_reader import ErrorCollector
-from flatland.errors import Place
 from flatland.scenarios.cluster import Cluster
 from flatland.scenarios.columns import FAULTS
 from flatland.scenarios.comparison import Change, Comparison, compare
@@ -276,19 +274,16 @@ def _list(options: argparse.Namespace) -> int:
 
 
 def _load(options: argparse.Namespace) -> list[Scenario] | None:
-    """Returns the scenarios; None if they have errors, all of which are printed."""
-    collector = ErrorCollector()
-    files = scenario_files(options.paths)
-    scenarios: list[Scenario] = []
-    for file in files:
-        with collector.at(Place(str(file))):
-            scenarios += load_suite([file], dict(options.param), read=collector.read)
-    if not collector.errors:
-        return load_suite(files, dict(options.param), options.only)
-    for error in collector.errors:
-        place = error.place or Place(str(files[0]))
-        print(Problem.make("error", error.message, place, error.hint).text(), file=sys.stderr)
-    return None
+    """Returns the scenarios; None if they have errors. All problems are printed."""
+    files, params = scenario_files(options.paths), dict(options.param)
+    problems = [
+        problem for file in files for problem in check_scenarios(file, params, options.seeds)[1]
+    ]
+    for problem in problems:
+        print(problem.text(), file=sys.stderr)
+    if any(problem.severity == "error" for problem in problems):
+        return None
+    return load_suite(files, params, options.only)
 
 
 def _run(options: argparse.Namespace, runs: Sequence[Run], stop: StopSignals) -> SuiteResults:

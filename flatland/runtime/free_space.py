@@ -37,6 +37,8 @@ class FreeSpace:
         radius: float,
         clearance: float,
         fits: Callable[[DoubleArray, float], BoolArray],
+        *,
+        cell: float | None = None,
     ) -> None:
         """Creates the grid.
 
@@ -47,16 +49,16 @@ class FreeSpace:
             clearance: Minimum distance of a placed disc to the walls [m].
             fits: The exact test: returns for centers, shape (n, 2), and a radius which discs
                 overlap no wall, shape (n,).
+            cell: Width of a cell, at least the `least_cell` of the bounds [m]; None for one that
+                depends on the radius.
         """
         x_min, y_min, x_max, y_max = bounds
         width, height = x_max - x_min, y_max - y_min
         self._radius = radius
         self._fits = fits
-        self._cell = max(
-            min(max(radius / _CELLS_PER_RADIUS, _MIN_CELL_SIZE), _MAX_CELL_SIZE),
-            math.sqrt(width * height / _MAX_CELLS),
-            max(width, height) / _MAX_CELLS,
-        )
+        if cell is None:
+            cell = min(max(radius / _CELLS_PER_RADIUS, _MIN_CELL_SIZE), _MAX_CELL_SIZE)
+        self._cell = max(cell, _limit_of_cells(width, height))
         self._x, self._y = float(x_min), float(y_min)
         self._origin = np.array([x_min, y_min])
         self._extent = np.array([width, height])
@@ -131,6 +133,28 @@ class FreeSpace:
     def _with_outside(self, regions: npt.NDArray[np.int32]) -> frozenset[int]:
         found = frozenset(np.unique(regions).tolist()) - {0}
         return found | self._outside if found & self._outside else found
+
+    def distance_to(self, regions: frozenset[int], x: float, y: float) -> float:
+        """Returns the distance from a point to some connected regions [m], to within a cell.
+
+        Args:
+            regions: Numbers of the regions.
+            x: Position in the world frame [m], may be out of bounds.
+            y: Position in the world frame [m].
+
+        Returns:
+            The distance to the nearest center of a cell in which the disc fits; infinite if there
+            is none; 0 for a point outside of the rectangle if its surroundings are a region.
+        """
+        if _OUTSIDE in regions and self.cell_at(x, y) is None:
+            return 0.0
+        cells = np.flatnonzero(np.isin(self._regions, list(regions)))
+        offsets = self._centers(cells) - (x, y)
+        return float(np.hypot(*offsets.T).min(initial=math.inf))
+
+    def is_outside(self, regions: frozenset[int]) -> bool:
+        """Returns whether the surroundings of the rectangle are one of some regions."""
+        return _OUTSIDE in regions
 
     @property
     def size(self) -> int:
@@ -252,6 +276,16 @@ class FreeSpace:
         near = np.hypot(*(self._centers(around) - point).T) <= math.sqrt(2) * self._cell
         regions: npt.NDArray[np.int32] = np.unique(self._regions[around[near]])
         return np.trim_zeros(regions)
+
+
+def least_cell(bounds: Bounds) -> float:
+    """Returns the least width of a cell that limits the number of cells of a rectangle [m]."""
+    x_min, y_min, x_max, y_max = bounds
+    return max(_MIN_CELL_SIZE, _limit_of_cells(x_max - x_min, y_max - y_min))
+
+
+def _limit_of_cells(width: float, height: float) -> float:
+    return max(math.sqrt(width * height / _MAX_CELLS), max(width, height) / _MAX_CELLS)
 
 
 class Spread:

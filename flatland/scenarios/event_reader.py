@@ -14,13 +14,25 @@ _TRIGGERS: Final = ("at", "near", "after_goal")
 _PEOPLE: Final = ("stop", "resume", "send")
 
 
-def read_spawn(entry: YamlReader) -> Spawn:
-    """Reads a model that is added to the world."""
+def read_model(entry: YamlReader) -> Spawn:
+    """Reads a model that is added to the world before the start."""
     spawn = Spawn(
         name=entry.get("name", "string"),
         model=existing_file(entry, "model", "model"),
-        pose=None if "ahead" in entry else entry.get("pose", "pose", finite=True),
-        ahead=entry.get("ahead", "float", 0.0, finite=True),
+        pose=entry.get("pose", "pose", finite=True),
+    )
+    entry.ensure_accessed_all()
+    return spawn
+
+
+def _read_spawn(entry: YamlReader) -> Spawn:
+    if "ahead" not in entry:
+        return read_model(entry)
+    spawn = Spawn(
+        name=entry.get("name", "string"),
+        model=existing_file(entry, "model", "model"),
+        pose=None,
+        ahead=entry.get("ahead", "float", finite=True),
     )
     entry.ensure_accessed_all()
     return spawn
@@ -71,7 +83,7 @@ def _read_trigger(entry: YamlReader) -> Trigger:
 
 
 def _spawn(entry: YamlReader) -> dict[str, Any]:
-    return {"spawn": read_spawn(entry.subnode("spawn", "map"))}
+    return {"spawn": _read_spawn(entry.subnode("spawn", "map"))}
 
 
 def _delete(entry: YamlReader) -> dict[str, Any]:

@@ -45,7 +45,7 @@ class Events:
         for event in due:
             self._waiting.remove(event)
             try:
-                self._carry_out(event)
+                self.carry_out(event)
             except FlatlandError as error:
                 raise ScenarioError(f"{event.action} [{event.text}]: {error.message}") from error
 
@@ -57,7 +57,12 @@ class Events:
         place = trigger.place or (0.0, 0.0)
         return math.dist(self._stage.robot.pose[:2], place) <= trigger.radius
 
-    def _carry_out(self, event: Event) -> None:
+    def carry_out(self, event: Event) -> None:
+        """Carries out an event now.
+
+        Raises:
+            FlatlandError: It is not possible.
+        """
         world, values = self._stage.world, event.values
         match event.action:
             case "spawn":

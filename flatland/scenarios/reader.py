@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
@@ -16,7 +17,7 @@ from flatland.errors import YamlError
 from flatland.geometry import Vector2
 from flatland.scenarios.conditions import Condition, ConditionError, parse_condition
 from flatland.scenarios.entries import choice, existing_file
-from flatland.scenarios.event_reader import read_events, read_spawn
+from flatland.scenarios.event_reader import read_events, read_model
 from flatland.scenarios.scenario import (
     GeneratedWorld,
     Limits,
@@ -46,11 +47,35 @@ def is_scenario_file(path: str | os.PathLike[str]) -> bool:
         return False
 
 
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A scenario and its text.
+
+    Attributes:
+        scenario: The scenario.
+        reader: The map that the scenario was read from, with the values of its matrix.
+        inputs: Lists the parameters that expressions of the file have used.
+    """
+
+    scenario: Scenario
+    reader: YamlReader
+    inputs: Inputs
+
+
 def read_scenarios(
     path: str | os.PathLike[str],
     params: Mapping[str, object] | None = None,
     read: ReadYaml = read_yaml,
 ) -> list[Scenario]:
+    """Reads a scenario file; see `read_entries`."""
+    return [entry.scenario for entry in read_entries(path, params, read)]
+
+
+def read_entries(
+    path: str | os.PathLike[str],
+    params: Mapping[str, object] | None = None,
+    read: ReadYaml = read_yaml,
+) -> list[Entry]:
     """Reads a scenario file, one scenario for each entry and combination of its matrix.
 
     Args:
@@ -66,8 +91,8 @@ def read_scenarios(
     given = dict(params or {})
     draft = _first_pass(file, given)
     count = len(draft.subnode("scenarios", "list")) if "scenarios" in draft else 1
-    scenarios: list[Scenario] = []
-    roots: dict[tuple[tuple[str, str], ...], YamlReader] = {}
+    entries: list[Entry] = []
+    roots: dict[tuple[tuple[str, str], ...], tuple[YamlReader, Inputs]] = {}
     combinations = [list(_combinations(_entry(draft, index))) for index in range(count)]
     # The expressions of other scenarios in the same file need values as well.
     firsts = {
@@ -83,16 +108,17 @@ def read_scenarios(
             key = tuple(texts.items())
             if key not in roots:
                 known = {name: _plain(value.plain()) for name, value in values.items()}
-                roots[key] = read(file, Inputs(firsts | known | given, logs=not roots))
-            root = roots[key]
+                inputs = Inputs(firsts | known | given, logs=not roots)
+                roots[key] = (read(file, inputs), inputs)
+            root, inputs = roots[key]
             fields = {k: v for k, v in combination.items() if k.startswith(_FIELD)}
             with root.collect_errors():
                 reader = _with_fields(_entry(root, index), fields)
                 variant = {name: _text(value) for name, value in combination.items()}
                 scenario = _read_scenario(reader, file, variant, values, given)
-                scenarios.append(scenario)
-    _check_names(draft, scenarios)
-    return scenarios
+                entries.append(Entry(scenario, reader, inputs))
+    _check_names(draft, entries)
+    return entries
 
 
 def _first_pass(file: str, params: Mapping[str, object]) -> YamlReader:
@@ -165,8 +191,8 @@ def _plain(value: Any) -> object:
     return value
 
 
-def _check_names(root: YamlReader, scenarios: Sequence[Scenario]) -> None:
-    titles = [scenario.title for scenario in scenarios]
+def _check_names(root: YamlReader, entries: Sequence[Entry]) -> None:
+    titles = [entry.scenario.title for entry in entries]
     for title in titles:
         if titles.count(title) > 1:
             raise root.error(f'there are two scenarios "{title}"; names must be different')
@@ -198,7 +224,7 @@ def _read_scenario(
         start=_read_start(reader),
         goals=_read_goals(reader),
         tolerance=reader.get("tolerance", "float", 0.3, finite=True, minimum=0.01),
-        models=tuple(_read_items(reader, "models", read_spawn)),
+        models=tuple(_read_items(reader, "models", read_model)),
         people=tuple(_read_items(reader, "people", _read_people)),
         events=tuple(read_events(reader.optional_subnode("events", "list"), robot.name)),
         limits=_read_limits(reader.optional_subnode("limits", "map")),

@@ -53,6 +53,10 @@ def suite(files, monkeypatch):
     files.write("room.world.yaml", WORLD)
     files.write("own.py", SLOW)
     files.write(
+        "box.model.yaml",
+        "bodies: [{name: b, type: static, footprints: [{type: circle, radius: 0.3, density: 0}]}]",
+    )
+    files.write(
         "s.yaml",
         """
         world: room.world.yaml
@@ -87,9 +91,10 @@ def test_a_suite_is_run_and_reported(suite, capsys):
 
 def test_a_failed_run_is_drawn_and_can_be_replayed(suite, capsys):
     options = ("--robot", "straight", "--param", "x=1", "--out", "out", "--junit", "j.xml")
-    # The robot starts near the wall, since the replay takes as long as the run.
-    for name, old, new in (("s.yaml", "[4.5, 5]", "[20, 5]"), ("room.world.yaml", "[3,", "[7,")):
-        (suite / name).write_text((suite / name).read_text().replace(old, new))
+    # A box is in the way, and near, since the replay takes as long as the run.
+    box = "models: [{name: box, model: box.model.yaml, pose: [4.2, 5, 0]}]\n"
+    text = (suite / "s.yaml").read_text().replace("[4.5, 5]", "[5.5, 5]")
+    (suite / "s.yaml").write_text(box + text)
     assert main("test", "s.yaml", "--seeds", "4", *options) == 1
     output = capsys.readouterr().out
     assert "worst run: s straight seed 4" in output
@@ -182,6 +187,22 @@ def test_check_lists_the_errors_of_a_scenario(suite, capsys):
     assert main("check", "s.yaml", "--json") == 1
     report = json.loads(capsys.readouterr().out)
     assert (report["kind"], report["errors"]) == ("scenario", 2)
+
+
+def test_scenarios_that_do_not_fit_their_world_are_not_run(suite, capsys):
+    text = (suite / "s.yaml").read_text()
+    (suite / "s.yaml").write_text(f"{text}robot: bot\nparams: {{unused: 1}}\n")
+    assert main("check", "s.yaml") == 1
+    checked = capsys.readouterr().out
+    assert main("test", "s.yaml", "--robot", "straight") == 1
+    errors = capsys.readouterr().err
+    assert errors.splitlines()[0] == 's.yaml:7: error: the robot "bot" does not exist'
+    assert errors in checked
+    assert not (suite / "flatland-test").exists()
+    # A warning is printed, and the scenario is run.
+    (suite / "s.yaml").write_text(f"{text}params: {{unused: 1}}\n")
+    assert main("test", "s.yaml", "--robot", "straight") == 0
+    assert "s.yaml:7: warning: no file of the world" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
