@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import signal
 import sys
@@ -11,6 +12,7 @@ from collections.abc import Sequence
 import flatland
 from flatland.cli import check, doctor, info, new, replay, run, show, test, view
 from flatland.errors import FlatlandError
+from flatland.output_files import named_errors
 
 _BROKEN_PIPE = 128 + signal.SIGPIPE  # exit code in a shell of a program ended by SIGPIPE
 _INTERRUPTED = 128 + signal.SIGINT
@@ -55,6 +57,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # Names of files may contain any bytes, and the encoding of a terminal may be limited.
+            stream.reconfigure(errors="backslashreplace")
     try:
         try:
             parser = make_parser()
@@ -63,7 +69,8 @@ def _run(arguments: Sequence[str] | None) -> int:
             code: int = options.run(options)
         finally:
             # Flush here: an error at the end of the interpreter is printed with a traceback.
-            print(end="", flush=True)
+            with named_errors("standard output"):
+                print(end="", flush=True)
     except BrokenPipeError:
         raise
     except FlatlandError as error:

@@ -246,8 +246,10 @@ def _test(options: argparse.Namespace) -> int:
             results = _run(options, runs, stop)
         names = list(map(clean_name, controllers))
         comparisons = _comparisons(results, names, baseline)
-        incomplete = _write(options, controllers, results, comparisons)
+        incomplete, has_report = _write(options, controllers, results, comparisons)
     _print(options, results, comparisons)
+    if has_report:
+        _print_report(options, results)
     for text in incomplete:
         print(f"flatland: {text}", file=sys.stderr)
     if stop.signal:
@@ -367,8 +369,12 @@ def _write(
     controllers: Sequence[str],
     results: SuiteResults,
     comparisons: dict[str, Comparison],
-) -> list[str]:
-    """Writes all files of results, and returns which are incomplete, with the reasons."""
+) -> tuple[list[str], bool]:
+    """Writes all files of results.
+
+    Returns:
+        Which files are incomplete, with the reasons, and whether the report was written.
+    """
     folder = options.out
     command = ["flatland", "test", *options.paths]
     command += [word for name in controllers for word in ("--robot", name)]
@@ -384,11 +390,13 @@ def _write(
         lambda: write_junit(results, options.junit or folder / "junit.xml"),
         lambda: write_report(results, Report(command, comparisons), folder / _REPORT),
     ):
+        has_written = True
         try:
             write()
         except OSError as error:
+            has_written = False
             incomplete.append(f"not written: {error}")
-    return incomplete
+    return incomplete, has_written
 
 
 def _print(
@@ -413,6 +421,9 @@ def _print(
             print(picture)
         if worst.recording:
             print(f"flatland replay {options.out / worst.recording} --view")
+
+
+def _print_report(options: argparse.Namespace, results: SuiteResults) -> None:
     print(f"\nreport: {options.out / _REPORT}")
     if any(result.recording for result in results.results):
         print(f"with links that replay the runs: flatland replay {options.out} --view")

@@ -12,7 +12,7 @@ import fcntl
 import importlib.util
 import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -92,9 +92,8 @@ def write_results(results: SuiteResults, folder: Path) -> list[Path]:
     """Writes all files of complete or partial results, and returns their paths.
 
     Raises:
-        OSError: A file cannot be written; the text names it.
+        OSError: Files cannot be written; the text names all of them.
     """
-    written = [folder / "results.json", folder / "results.csv"]
     content = {
         "format": FORMAT,
         "flatland": VERSION,
@@ -103,14 +102,27 @@ def write_results(results: SuiteResults, folder: Path) -> list[Path]:
         "outlines": results.outlines,
         "runs": [_to_json(results, result) for result in results.results],
     }
-    write_text(written[0], json.dumps(content, separators=(",", ":")) + "\n")
-    write_text(written[1], _csv(results.rows))
+    writers: dict[Path, Callable[[Path], None]] = {
+        folder / "results.json": lambda path: write_text(path, _compact_json(content)),
+        folder / "results.csv": lambda path: write_text(path, _csv(results.rows)),
+    }
     if importlib.util.find_spec("pyarrow") is not None:
-        written.append(folder / "results.parquet")
-        write_parquet(results.rows, written[-1])
+        writers[folder / "results.parquet"] = lambda path: write_parquet(results.rows, path)
+    errors = []
+    for path, write in writers.items():
+        try:
+            write(path)
+        except OSError as error:
+            errors.append(str(error))
+    if errors:
+        raise OSError("; ".join(errors))
     if not results.missing:
         (folder / _UNFINISHED).unlink(missing_ok=True)
-    return written
+    return list(writers)
+
+
+def _compact_json(content: object) -> str:
+    return json.dumps(content, separators=(",", ":")) + "\n"
 
 
 def _to_json(results: SuiteResults, result: Result) -> dict[str, Any]:
