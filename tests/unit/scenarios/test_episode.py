@@ -353,6 +353,39 @@ class Raises(Nan):
 class Leaves(Nan):
     def command(self, scan, pose, goal): raise SystemExit(3)
 
+class Interrupts(Nan):
+    def command(self, scan, pose, goal): raise KeyboardInterrupt("my own")
+
+class Exits(Nan):
+    def command(self, scan, pose, goal): raise GeneratorExit("the end")
+
+class Evil(Exception):
+    def __str__(self): raise ValueError("no text")
+    __repr__ = __str__
+
+class Unprintable(Nan):
+    def command(self, scan, pose, goal): raise Evil
+
+class Returns(Nan):
+    def command(self, scan, pose, goal): return Evil()
+
+class Long(Nan):
+    def command(self, scan, pose, goal): raise ValueError("A" * 5_000_000)
+
+class Surrogate(Nan):
+    def command(self, scan, pose, goal): raise ValueError("bad \\udcff name")
+
+class Cheats:
+    def __init__(self, task): self.task = task
+    def command(self, scan, pose, goal):
+        self.task.world.move_model("robot", (*goal, 0))
+        return flatland.Twist()
+
+class Redefines:
+    def __init__(self, task):
+        object.__setattr__(task, "goals", (task.robot.pose[:2],))
+    def command(self, scan, pose, goal): return flatland.Twist()
+
 class Counts(Nan):
     recoveries = 2
     def command(self, scan, pose, goal): return flatland.Twist(linear_x=100.0)
@@ -379,6 +412,13 @@ NUMBER = 5
         ("own.py:Words", "returned a command that is not finite"),
         ("own.py:Raises", "RuntimeError: no way [own.py:9]"),
         ("own.py:Leaves", "SystemExit: 3"),
+        ("own.py:Interrupts", "KeyboardInterrupt: my own [own.py:"),
+        ("own.py:Exits", "GeneratorExit: the end [own.py:"),
+        ("own.py:Unprintable", "Evil: <Evil whose text raises ValueError> [own.py:"),
+        ("own.py:Returns", "return a flatland.Twist, got <Evil whose text raises ValueError>"),
+        ("own.py:Long", "A... (4998000 more characters) [own.py:"),
+        ("own.py:Surrogate", r"ValueError: bad \udcff name [own.py:"),
+        ("own.py:Cheats", '"move_model" of the world is not available: a controller can only'),
         ("own.py:Miscounts", "recoveries of the controller must be a count, got 'many'"),
         ("own.py:Unprepared", "ValueError: not today"),
         ("own.py:nothing", "must return a flatland.Twist, got None"),
@@ -396,6 +436,19 @@ def test_a_controller_that_fails_is_an_error_with_the_reason(name, message, run,
     row = run("limits: {time: 1}", name).row
     assert (row["outcome"], row["success"], row["passed"]) == ("error", False, False)
     assert message in row["error"]
+
+
+def test_ctrl_c_ends_a_run(run, room):
+    (room / "own.py").write_text(
+        "import signal\ndef own(scan, pose, goal): signal.raise_signal(signal.SIGINT)"
+    )
+    with pytest.raises(KeyboardInterrupt):
+        run("limits: {time: 1}", "own.py:own")
+
+
+def test_a_controller_cannot_set_its_goal(run, room):
+    (room / "own.py").write_text(CONTROLLERS)
+    assert run("limits: {time: 1}", "own.py:Redefines").row["outcome"] == "timeout"
 
 
 def test_commands_are_limited_and_recoveries_are_reported(run, room):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+from pathlib import Path
 
 import pytest
 from waiting import wait_until
@@ -17,12 +18,13 @@ from flatland.scenarios.suite import Plan, SuiteError, run_suite, runs_of
 from flatland.scenarios.workers import WorkerLimits, run_in_processes
 
 CONTROLLERS = """
-import os, signal, threading
+import os, shutil, signal, subprocess, threading, time
 from pathlib import Path
 import numpy as np
 import flatland
 
 FOLDER = Path(__file__).parent
+MARKER = "987654.5"
 
 class Drives:
     def __init__(self, task):
@@ -61,6 +63,31 @@ class DiesOnce(Drives):
 class Dies(Drives):
     def command(self, scan, pose, goal):
         os._exit(3)
+
+class Forks(Drives):
+    # Starts processes that would outlive it, and forks that would go on with the run.
+    def command(self, scan, pose, goal):
+        if not hasattr(self, "forked"):
+            self.forked = True
+            subprocess.Popen(["sleep", MARKER])
+            subprocess.Popen(["sleep", MARKER], env={}, start_new_session=True)
+            if os.fork() == 0:
+                os.setsid()
+                if os.fork() == 0:  # with another parent
+                    os.execve(shutil.which("sleep"), ["sleep", MARKER], {})
+        os.fork()
+        return super().command(scan, pose, goal)
+
+class ForksAndDies(Drives):
+    # A fork keeps the connection open.
+    def command(self, scan, pose, goal):
+        if os.fork() == 0:
+            os.setsid()
+            (FOLDER / f"fork{os.getpid()}").touch()
+            signal.pause()
+        while not any(FOLDER.glob("fork*")):
+            time.sleep(0.01)
+        os._exit(4)
 
 class Faults(Drives):
     def command(self, scan, pose, goal):
@@ -137,6 +164,33 @@ def test_a_run_that_ends_its_process_is_an_error_and_does_not_affect_others(suit
     assert (dies["outcome"], dies["passed"]) == ("error", False)
 
 
+def commands() -> list[bytes]:
+    found = []
+    for file in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            found.append(file.read_bytes())
+        except OSError:  # it has ended
+            continue
+    return found
+
+
+def test_what_a_controller_starts_ends_with_the_suite(suite):
+    runs, plan = suite(["Forks"])
+    (result,) = carry_out(runs, plan).values()
+    assert result.row["passed"], result.row["error"]
+    assert not any(b"987654.5" in command for command in commands())
+
+
+def test_a_fork_does_not_hide_the_end_of_a_worker(suite, room):
+    # Without a limit of a call, which a worker that has ended would exceed.
+    runs, plan = suite(["ForksAndDies"], limits=WorkerLimits(command_time=1e6), workers=1)
+    (result,) = carry_out(runs, plan).values()
+    assert "the worker process ended in each of 3 attempts (exit code 4)" in result.row["error"]
+    forks = [int(file.name.removeprefix("fork")) for file in room.glob("fork*")]
+    assert forks
+    wait_until("the forks have ended", lambda: all(map(has_ended, forks)))
+
+
 def test_a_run_whose_worker_is_killed_is_made_again(suite, room):
     runs, plan = suite(["DiesOnce"], seeds=(0, 1, 2))
     results = carry_out(runs, plan)
@@ -155,20 +209,20 @@ def test_what_a_controller_prints_is_dropped_or_shown(is_shown, suite, capfd, mo
     assert ("xxxx" in capfd.readouterr().out) == is_shown
 
 
+def has_ended(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return True
+    return False
+
+
 def test_the_processes_end_with_the_suite(suite):
     runs, plan = suite(["Drives"], seeds=range(6))
     workers = set()
     for result in run_in_processes(runs, plan.options, plan.limits, 2):
         workers.add(int(result.row["worker"].rpartition(":")[2]))
         break
-
-    def has_ended(pid: int) -> bool:
-        try:
-            os.kill(pid, 0)
-        except ProcessLookupError:
-            return True
-        return False
-
     wait_until("the workers have ended", lambda: all(map(has_ended, workers)))
 
 

@@ -1,0 +1,21 @@
+"""A limit of the size of files, at which writing fails as on a full disk."""
+
+from __future__ import annotations
+
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+REASON = "File too large"
+"""The error of the operating system at the limit."""
+
+
+@contextmanager
+def limited_files(size: int) -> Iterator[None]:
+    """Limits the files that this process writes in a block to a size [bytes]."""
+    before, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, most))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (before, most))
