@@ -154,6 +154,7 @@ class _Fit:
             self._check_poses(stage, around)
             self._check_events(stage, timeline, around)
             self._check_contacts(timeline, references)
+            self._check_conditions(references)
             self._check_params(references)
         return stage is not None and self._is_loaded
 
@@ -423,7 +424,9 @@ class _Fit:
         if not problem and not around.reaches(regions, goal, tolerance):
             problem = around.narrow(start)
         if problem:
-            self._error(f"the goal {_shown(goal)} cannot be reached: {problem}", *keys)
+            # Otherwise, the scenario may be about what a robot does then.
+            report = self._error if self._must_reach_goals else self._warn
+            report(f"the goal {_shown(goal)} cannot be reached: {problem}", *keys)
         elif around.has_images and around.is_outside(goal):
             self._warn(f"the goal {_shown(goal)} is outside of {around.extent}", *keys)
         elif (
@@ -436,6 +439,19 @@ class _Fit:
                 f"{tolerance:g} m from the start {_shown(start)}",
                 *keys,
             )
+        elif index and wanted == self._scenario.goals[index - 1] and isinstance(wanted, tuple):
+            self._warn(f"the goal {_shown(goal)} is reached at once, it is the one before", *keys)
+
+    @property
+    def _must_reach_goals(self) -> bool:
+        """Whether a condition cannot hold unless all goals are reached."""
+        goals = len(self._scenario.goals)
+        return any(
+            one.needs_success
+            or (one.measure == "spl" and one.comparison in (">", ">="))
+            or (one.measure == "goals" and one.limit == goals and one.comparison == ">=")
+            for one in self._scenario.require
+        )
 
     def _check_duration(self, stage: Stage) -> None:
         """Warns if even a straight way takes longer than a run may."""
@@ -475,6 +491,39 @@ class _Fit:
                 )
 
             references.add(reader, name, name in known, error)
+
+    def _check_conditions(self, references: _References) -> None:
+        """Reports conditions that hold in no run."""
+        limit = self._scenario.limits.time
+        largest = {"spl": 1.0, "goals": float(len(self._scenario.goals)), "time": limit}
+        largest |= dict.fromkeys(("stuck_time", "intrusion_time"), limit)
+        for index, condition in enumerate(self._scenario.require):
+            bound = condition.limit
+            if isinstance(bound, str):
+                continue
+            most = largest.get(condition.measure, math.inf)
+            least = self._world.timekeeper.step_size if condition.measure == "time" else 0.0
+            holds = {
+                "<": bound > least,
+                "<=": bound >= least,
+                ">": bound < most,
+                ">=": bound <= most,
+            }[condition.comparison]
+            reader = self._sub("require", index)
+
+            def error(
+                text: str = condition.text,
+                measure: str = condition.measure,
+                least: float = least,
+                most: float = most,
+                reader: YamlReader = reader,
+            ) -> FlatlandError:
+                shown = f"at least {least:g}"
+                if math.isfinite(most):
+                    shown = f"from {least:g} to {most:g}"
+                return reader.error(f'"{text}" cannot hold: {measure} is {shown}')
+
+            references.add(reader, condition.text, holds, error)
 
     def _check_params(self, references: _References) -> None:
         of_world = set(self._world.source.inputs.params)
@@ -530,7 +579,7 @@ class _Timeline:
             return "does not exist"
         spawns = self._of("spawn", name)
         if name not in self._initial and all(self._is_before(index, one) for one in spawns):
-            return f"exists only from {_when(self._events[spawns[0]].trigger)} on"
+            return f"is only added {_when(self._events[spawns[0]].trigger)}"
         deleted = [one for one in self._of("delete", name) if self._is_before(one, index)]
         for one in deleted:
             # It may have been added again in the meantime.

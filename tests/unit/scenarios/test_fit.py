@@ -86,6 +86,9 @@ def problems(room, files):
             'a model "lid" exists already',
             "",
         ),
+        ("require: [spl > 1]", '"spl > 1" cannot hold: spl is from 0 to 1', ""),
+        ("require: [at least 2 goals]", "goals is from 0 to 1", ""),
+        ("require: [reached within 0 s]", "cannot hold: time is from 0.005 to 60", ""),
         # Values of commands.
         (
             "models: [{name: d, model: door.model.yaml, pose: [4, 4, 0]}]\n"
@@ -122,7 +125,7 @@ def problems(room, files):
         (
             "events:\n- {at: 5, spawn: {name: b, model: box.model.yaml, ahead: 1}}\n"
             "- {at: 3, delete: b}",
-            'model "b" exists only from at 5 s on',
+            'model "b" is only added at 5 s',
             "",
         ),
         (
@@ -133,7 +136,7 @@ def problems(room, files):
         (
             "events:\n- {at: 5, spawn: {name: d, model: door.model.yaml, pose: [4, 4, 0]}}\n"
             "- {at: 3, command: {topic: door, value: true}}",
-            'model "d" with the command "door" exists only from at 5 s on',
+            'model "d" with the command "door" is only added at 5 s',
             "",
         ),
     ],
@@ -154,6 +157,9 @@ def test_mistakes_are_errors(text, message, hint, problems):
         ("robot: {period: 0.012}", "must be a multiple of the step of 0.005 s, got 0.012; 0.01 s"),
         ("goal: [2.1, 5]", "is reached at once"),
         ("limits: {time: 2}", "cannot be reached within 2 s"),
+        ("goals: [[5, 5], [5, 5]]", "is reached at once, it is the one before"),
+        # A scenario about a robot that does not reach its goal.
+        ("goal: [8, 2]\nrequire: [no contact]", "cannot be reached: no way from (2, 5)"),
     ],
 )
 def test_what_is_probably_wrong_is_a_warning(text, message, problems):

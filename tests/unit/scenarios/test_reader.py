@@ -128,6 +128,7 @@ def test_given_parameters_take_precedence(scenario):
             "",
         ),
         ("models: [{name: a, model: bx.model.yaml, pose: [0, 0, 0]}]", "model file does not", ""),
+        ("models: [{name: a, model: box.model.yaml, ahead: 1}]", '"pose" does not exist', ""),
         ("limits: {time: -1}", 'Invalid "time"', ""),
         ("goal: {distance: [3, 2]}", "must be [least, most]", ""),
         ("matrix: {a: []}", "a list of at least one value", ""),
