@@ -100,6 +100,33 @@ Raises:
     StaleHandleError: The world is closed.
     WorldLockedError: The world is stepping.
 )");
+  world.def_property_readonly(
+      "newest_objects",
+      [](const World& self) {
+        const auto [body, joint] = self.newest_objects();
+        return py::make_tuple(body, joint);
+      },
+      "Ids of the newest body and the newest joint, 0 for none; for `objects_since`.");
+  world.def(
+      "objects_since",
+      [](const World& self, const std::pair<Id, Id>& newest) {
+        const auto [bodies, joints] = self.objects_since({newest.first, newest.second});
+        return py::make_tuple(bodies, joints);
+      },
+      py::arg("newest"), R"(
+Returns the bodies and joints that were created since, by id.
+
+Args:
+    newest: Earlier value of `newest_objects`.
+
+Returns:
+    Ids of bodies and of joints, the newest first. There are none of a kind whose object in `newest`
+    was destroyed meanwhile, since it is not known which ones are newer.
+
+Raises:
+    StaleHandleError: The world is closed.
+    WorldLockedError: The world is stepping.
+)");
 }
 
 }  // namespace flatland

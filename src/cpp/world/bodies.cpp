@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <variant>
 
 #include "world/errors.h"
 #include "world/shapes.h"
@@ -56,6 +58,29 @@ void check_acceleration(float acceleration, const char* what) {
   if (!(std::abs(static_cast<double>(acceleration)) <= kMaxMagnitude)) {
     throw std::invalid_argument(std::string(what) + " is too large for the mass of the body");
   }
+}
+
+using ScaledShape = std::variant<b2CircleShape, b2PolygonShape>;
+
+// Returns a circle or a polygon whose lengths are multiplied by a factor. Throws
+// std::invalid_argument if Box2D cannot compute with it.
+ScaledShape scaled_shape(const b2Shape& shape, float scale) {
+  if (shape.GetType() == b2Shape::e_circle) {
+    b2CircleShape circle = static_cast<const b2CircleShape&>(shape);
+    circle.m_p *= scale;
+    circle.m_radius *= scale;
+    check_shape(circle);
+    return circle;
+  }
+  b2PolygonShape polygon = static_cast<const b2PolygonShape&>(shape);
+  polygon.m_centroid *= scale;
+  for (int32 i = 0; i < polygon.m_count; ++i) polygon.m_vertices[i] *= scale;
+  check_shape(polygon);
+  return polygon;
+}
+
+const b2Shape* shape_in(const ScaledShape& scaled) {
+  return std::visit([](const auto& shape) -> const b2Shape* { return &shape; }, scaled);
 }
 
 // Accounts for a new density or friction. A copy of a world that is restored to another one sets
@@ -288,6 +313,7 @@ void set_density(World& world, Id fixture_id, double density) {
   }
   fixture->SetDensity(checked);
   body->ResetMassData();
+  world.mass_changed(body);
   surface_changed(world, body);
 }
 
@@ -320,19 +346,25 @@ void scale_shapes(World& world, Id body_id, double factor) {
     if (f->GetType() == b2Shape::e_circle || f->GetType() == b2Shape::e_polygon) continue;
     throw std::invalid_argument("the body has edges, which cannot be scaled");
   }
+  // Nothing is changed unless all of the scaled shapes are valid.
   const auto scale = static_cast<float>(factor);
-  for (b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) {
+  std::deque<ScaledShape> scaled;
+  std::vector<MassivePart> parts;
+  for (const b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext()) {
+    scaled.push_back(scaled_shape(*f->GetShape(), scale));
+    parts.push_back({shape_in(scaled.back()), f->GetDensity()});
+  }
+  if (body->GetType() == b2_dynamicBody) check_mass(parts);
+  auto shape = scaled.begin();
+  for (b2Fixture* f = body->GetFixtureList(); f != nullptr; f = f->GetNext(), ++shape) {
     if (f->GetType() == b2Shape::e_circle) {
-      auto& circle = static_cast<b2CircleShape&>(*f->GetShape());
-      circle.m_p *= scale;
-      circle.m_radius *= scale;
+      static_cast<b2CircleShape&>(*f->GetShape()) = std::get<b2CircleShape>(*shape);
     } else {
-      auto& polygon = static_cast<b2PolygonShape&>(*f->GetShape());
-      polygon.m_centroid *= scale;
-      for (int32 i = 0; i < polygon.m_count; ++i) polygon.m_vertices[i] *= scale;
+      static_cast<b2PolygonShape&>(*f->GetShape()) = std::get<b2PolygonShape>(*shape);
     }
   }
   body->ResetMassData();
+  world.mass_changed(body);
   world.structure_changed();
   // Moves the boxes of the fixtures.
   body->SetTransform(body->GetPosition(), body->GetAngle());

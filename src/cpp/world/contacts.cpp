@@ -3,6 +3,7 @@
 #include <box2d/b2_body.h>
 #include <box2d/b2_contact.h>
 #include <box2d/b2_fixture.h>
+#include <box2d/b2_joint.h>
 #include <box2d/b2_world.h>
 
 #include <algorithm>
@@ -18,6 +19,7 @@ Id id_of(const b2Body* body) { return const_cast<b2Body*>(body)->GetUserData().p
 Id id_of(const b2Fixture* fixture) {
   return const_cast<b2Fixture*>(fixture)->GetUserData().pointer;
 }
+Id id_of(const b2Joint* joint) { return const_cast<b2Joint*>(joint)->GetUserData().pointer; }
 
 namespace {
 

@@ -11,6 +11,7 @@
 #include "world/step_guard.h"
 #include "world/touches.h"
 
+class b2Joint;
 class b2World;
 
 namespace flatland {
@@ -31,9 +32,10 @@ struct ContactRow {
   bool is_sensor;
 };
 
-// Return the id stored in the user data of a body or fixture.
+// Return the id stored in the user data of an object.
 Id id_of(const b2Body* body);
 Id id_of(const b2Fixture* fixture);
+Id id_of(const b2Joint* joint);
 
 // Interface for changing contacts before they are solved. It is called within b2World::Step, so it
 // must not throw, nor create, destroy or move objects.

@@ -3,12 +3,16 @@
 #include <box2d/b2_revolute_joint.h>
 #include <box2d/b2_weld_joint.h>
 
+#include <algorithm>
 #include <tuple>
 
 #include "world/errors.h"
 
 namespace flatland {
 namespace {
+
+// Of the stiffness and the damping of a spring, with which Box2D can compute.
+constexpr float kMaxStiffness = 1e30F;
 
 template <typename Definition>
 Definition joint_definition(World& world, const JointBodies& bodies) {
@@ -55,13 +59,23 @@ Id create_weld_joint(World& world, const JointBodies& bodies, double reference_a
   if (checked_frequency > 0.0F) {
     b2AngularStiffness(definition.stiffness, definition.damping, checked_frequency, checked_damping,
                        definition.bodyA, definition.bodyB);
-    constexpr float kMax = 1e30F;
-    if (!(definition.stiffness <= kMax && definition.damping <= kMax)) {
+    if (!(definition.stiffness <= kMaxStiffness && definition.damping <= kMaxStiffness)) {
       throw std::invalid_argument(
           "frequency and damping result in a spring that is too stiff for the bodies");
     }
   }
   return world.add_joint(definition, checked_frequency, checked_damping);
+}
+
+void set_spring(b2Joint* joint, float frequency, float damping_ratio) {
+  if (joint->GetType() != e_weldJoint || frequency == 0.0F) return;
+  auto* weld = static_cast<b2WeldJoint*>(joint);
+  float stiffness = 0.0F;
+  float damping = 0.0F;
+  b2AngularStiffness(stiffness, damping, frequency, damping_ratio, weld->GetBodyA(),
+                     weld->GetBodyB());
+  weld->SetStiffness(std::min(stiffness, kMaxStiffness));
+  weld->SetDamping(std::min(damping, kMaxStiffness));
 }
 
 std::optional<AngleLimits> limits_of(const World& world, Id joint_id) {

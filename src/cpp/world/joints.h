@@ -24,6 +24,9 @@ Id create_revolute_joint(World& world, const JointBodies& bodies,
 // Creates a weld joint: rigid if the frequency is 0, otherwise with an angular spring.
 Id create_weld_joint(World& world, const JointBodies& bodies, double reference_angle,
                      double frequency, double damping_ratio);
+// Sets the stiffness and the damping of the spring of a weld joint, which result from its frequency
+// and from the present moments of inertia of the bodies; has no effect on other joints.
+void set_spring(b2Joint* joint, float frequency, float damping_ratio);
 
 // Returns nullopt for a joint without limits and for a weld joint.
 std::optional<AngleLimits> limits_of(const World& world, Id joint);

@@ -60,11 +60,11 @@ std::vector<b2Vec2> wrap_hull(const std::vector<b2Vec2>& points) {
   return hull;
 }
 
-bool has_area(const std::vector<b2Vec2>& hull) {
-  if (hull.size() < 3) return false;
+bool has_area(const b2Vec2* hull, std::size_t count) {
+  if (count < 3) return false;
   float area = 0.0F;
   float longest = 0.0F;
-  for (std::size_t i = 1; i + 1 < hull.size(); ++i) {
+  for (std::size_t i = 1; i + 1 < count; ++i) {
     const b2Vec2 a = hull[i] - hull[0];
     const b2Vec2 b = hull[i + 1] - hull[0];
     area += 0.5F * b2Cross(a, b);
@@ -93,7 +93,8 @@ b2PolygonShape make_polygon(const std::vector<b2Vec2>& points) {
         "a polygon must have at least 3 points that are at least 2.5 mm apart, got " +
         std::to_string(distinct.size()));
   }
-  if (!has_area(wrap_hull(distinct))) {
+  const std::vector<b2Vec2> hull = wrap_hull(distinct);
+  if (!has_area(hull.data(), hull.size())) {
     throw std::invalid_argument(
         "a polygon must have a positive area, but its points are collinear");
   }
@@ -110,24 +111,34 @@ bool make_edge(const float* x1_y1_x2_y2, b2EdgeShape* edge) {
   return true;
 }
 
-void check_mass_with(const b2Body& body, const b2Shape& shape, float density) {
-  if (body.GetType() != b2_dynamicBody || density == 0.0F) return;
+void check_shape(const b2CircleShape& circle) {
+  make_circle(static_cast<double>(circle.m_p.x), static_cast<double>(circle.m_p.y),
+              static_cast<double>(circle.m_radius));
+}
+
+void check_shape(const b2PolygonShape& polygon) {
+  for (int32 i = 0; i < polygon.m_count; ++i) {
+    const b2Vec2& corner = polygon.m_vertices[i];
+    checked_vector(static_cast<double>(corner.x), static_cast<double>(corner.y), "corner");
+  }
+  if (!has_area(polygon.m_vertices, static_cast<std::size_t>(polygon.m_count))) {
+    throw std::invalid_argument("a polygon is too small to have an area");
+  }
+}
+
+void check_mass(const std::vector<MassivePart>& parts) {
   constexpr float kMin = 1e-20F;
   constexpr float kMax = 1e15F;
   float mass = 0.0F;
   float inertia = 0.0F;
   b2Vec2 center(0.0F, 0.0F);
-  const auto add = [&](const b2Shape& part, float part_density) {
+  for (const MassivePart& part : parts) {
+    if (part.density == 0.0F) continue;
     b2MassData data;
-    part.ComputeMass(&data, part_density);
+    part.shape->ComputeMass(&data, part.density);
     mass += data.mass;
     center += data.mass * data.center;
     inertia += data.I;
-  };
-  // The sum has the order of Box2D, the newest fixture first.
-  add(shape, density);
-  for (const b2Fixture* fixture = body.GetFixtureList(); fixture; fixture = fixture->GetNext()) {
-    if (fixture->GetDensity() != 0.0F) add(*fixture->GetShape(), fixture->GetDensity());
   }
   if (mass == 0.0F && inertia == 0.0F) return;  // a point
   if (!(mass >= kMin && mass <= kMax)) {
@@ -144,6 +155,16 @@ void check_mass_with(const b2Body& body, const b2Shape& shape, float density) {
         to_text(static_cast<double>(inertia)) +
         " (a shape may be too small and too far from the origin of the body)");
   }
+}
+
+void check_mass_with(const b2Body& body, const b2Shape& shape, float density) {
+  if (body.GetType() != b2_dynamicBody || density == 0.0F) return;
+  // The sum has the order of Box2D, the newest fixture first.
+  std::vector<MassivePart> parts{{&shape, density}};
+  for (const b2Fixture* f = body.GetFixtureList(); f != nullptr; f = f->GetNext()) {
+    parts.push_back({f->GetShape(), f->GetDensity()});
+  }
+  check_mass(parts);
 }
 
 }  // namespace flatland

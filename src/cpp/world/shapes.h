@@ -25,8 +25,22 @@ b2PolygonShape make_polygon(const std::vector<b2Vec2>& points);
 // Sets a two-sided edge. Returns false if it is shorter than kMinEdgeLength.
 bool make_edge(const float* x1_y1_x2_y2, b2EdgeShape* edge);
 
-// Throws std::invalid_argument if, with this additional shape, the mass or the moment of inertia of
-// a body would be outside the range in which Box2D can compute.
+// A shape of a body with its density [kg/m^2].
+struct MassivePart {
+  const b2Shape* shape;
+  float density;
+};
+
+// Throws std::invalid_argument if the mass or the moment of inertia of a dynamic body that consists
+// of these shapes would be outside the range in which Box2D can compute.
+void check_mass(const std::vector<MassivePart>& parts);
+// The same for the shapes that a body has and an additional one; a body that is not dynamic has no
+// mass.
 void check_mass_with(const b2Body& body, const b2Shape& shape, float density);
+
+// Throws std::invalid_argument if the shape is outside the range in which Box2D can compute, such
+// as a polygon that is too small to have an area.
+void check_shape(const b2CircleShape& circle);
+void check_shape(const b2PolygonShape& polygon);
 
 }  // namespace flatland

@@ -88,7 +88,12 @@ StepGuard::Start& StepGuard::start_of(const b2Body* body) { return starts_[slot_
 StepGuard::Start& StepGuard::make_start(Id body) {
   const std::uint32_t slot = slot_of(body);
   if (slot >= starts_.size()) starts_.resize(slot + 1);
-  return starts_[slot];
+  Start& start = starts_[slot];
+  if (start.body != body) {
+    start = Start();
+    start.body = body;
+  }
+  return start;
 }
 
 void StepGuard::add_acceleration(Id body, float linear, float angular) {

@@ -49,9 +49,9 @@ class StepGuard {
   void post_solve(b2Contact* contact) noexcept;
 
  private:
-  // The state of a body before the step, and the energy that is allowed after the step, by the slot
-  // of the id.
+  // The state of a body before the step, and the energy that is allowed after the step.
   struct Start {
+    Id body = 0;
     double energy = 0.0;   // kinetic energy, including the energy that forces may add [J]
     double allowed = 0.0;  // maximum of `energy` before this step and before the previous step [J]
     float acceleration = 0.0F;
@@ -63,7 +63,7 @@ class StepGuard {
     std::uint64_t jammed_steps = 0;  // number of consecutive such steps up to `last_jam`
   };
 
-  // Returns the state of a body that may be new.
+  // Returns the state of a body; an empty one for a new body, also in the slot of a former one.
   Start& make_start(Id body);
   Start& start_of(const b2Body* body);
   // Returns the number of steps for which a body of the contact has been limited.
@@ -78,7 +78,7 @@ class StepGuard {
   bool has_accelerations_ = false;
   bool failed_ = false;  // whether counting contacts failed for lack of memory in this step
   std::uint64_t step_ = 0;
-  std::vector<Start> starts_;
+  std::vector<Start> starts_;  // by the slot of the id of the body
   std::vector<b2Body*> group_;
   std::unordered_map<const b2Contact*, int> updates_;
   std::vector<b2Body*> limited_;

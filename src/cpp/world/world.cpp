@@ -10,6 +10,7 @@
 
 #include "world/broad_phase.h"
 #include "world/errors.h"
+#include "world/joints.h"
 
 namespace flatland {
 namespace {
@@ -27,17 +28,6 @@ void initialize_contact_table() {
     for (int i = 0; i < 2; ++i) world.CreateBody(&definition)->CreateFixture(&circle, 1.0F);
     world.Step(0.01F, 1, 1);
   });
-}
-
-// Sets the mass of a dynamic body without mass to 1 kg with an infinite moment of inertia, as in
-// Box2D up to 2.3. In Box2D 2.4 such a body cannot be moved, nor can a robot that is welded to it.
-void ensure_mass(b2Body* body) {
-  if (body->GetType() != b2_dynamicBody || body->GetMass() > 0.0F) return;
-  b2MassData data;
-  data.mass = 1.0F;
-  data.center.SetZero();
-  data.I = 0.0F;
-  body->SetMassData(&data);
 }
 
 using Clock = std::chrono::steady_clock;
@@ -285,6 +275,28 @@ std::array<std::size_t, 4> World::object_counts() const {
           static_cast<std::size_t>(engine_->GetContactCount())};
 }
 
+std::array<Id, 2> World::newest_objects() const {
+  check_readable();
+  const b2Body* body = engine_->GetBodyList();
+  const b2Joint* joint = engine_->GetJointList();
+  return {body == nullptr ? 0 : id_of(body), joint == nullptr ? 0 : id_of(joint)};
+}
+
+std::array<std::vector<Id>, 2> World::objects_since(const std::array<Id, 2>& newest) const {
+  check_readable();
+  // In the lists of Box2D, the newest object is the first one.
+  const auto since = [](const auto* object, Id last) {
+    std::vector<Id> ids;
+    for (; object != nullptr && id_of(object) != last; object = object->GetNext()) {
+      ids.push_back(id_of(object));
+    }
+    if (object == nullptr && last != 0) ids.clear();  // which are new is not known
+    return ids;
+  };
+  return {since(static_cast<const b2World&>(*engine_).GetBodyList(), newest[0]),
+          since(static_cast<const b2World&>(*engine_).GetJointList(), newest[1])};
+}
+
 const b2Fixture* World::read_fixture(Id id) const {
   check_readable();
   b2Fixture* const* fixture = fixtures_.find(id);
@@ -344,7 +356,7 @@ Id World::add_body(const b2BodyDef& definition) {
   check_changeable();
   structure_changed();
   b2Body* body = engine_->CreateBody(&definition);
-  ensure_mass(body);
+  mass_changed(body);
   const Id id = bodies_.insert(body);
   body->GetUserData().pointer = id;
   return id;
@@ -354,7 +366,7 @@ Id World::add_fixture(b2Body* body, const b2FixtureDef& definition) {
   if (has_shared_walls(*body)) own_walls();
   structure_changed();
   b2Fixture* fixture = body->CreateFixture(&definition);
-  ensure_mass(body);
+  mass_changed(body);
   const Id id = fixtures_.insert(fixture);
   fixture->GetUserData().pointer = id;
   rays_.add(fixture);
@@ -439,6 +451,23 @@ void World::wake_neighbours(const b2Body* body) {
 void World::structure_changed() {
   static std::atomic<std::uint64_t> last{0};
   structure_ = ++last;
+}
+
+void World::mass_changed(b2Body* body) {
+  if (body->GetType() != b2_dynamicBody) return;
+  if (!(body->GetMass() > 0.0F)) {
+    // 1 kg with an infinite moment of inertia, as in Box2D up to 2.3. In Box2D 2.4 a body without
+    // mass cannot be moved, nor can a robot that is welded to it.
+    b2MassData data;
+    data.mass = 1.0F;
+    data.center.SetZero();
+    data.I = 0.0F;
+    body->SetMassData(&data);
+  }
+  for (const b2JointEdge* edge = body->GetJointList(); edge != nullptr; edge = edge->next) {
+    const JointRecord& record = *joints_.find(id_of(edge->joint));
+    set_spring(edge->joint, record.frequency, record.damping_ratio);
+  }
 }
 
 void World::fixture_changed(const b2Fixture* fixture) {

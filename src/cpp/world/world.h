@@ -137,6 +137,10 @@ class World final : private b2DestructionListener {
   // Numbers of bodies, fixtures, joints and contacts, including contacts of fixtures that only
   // overlap in the broad phase.
   std::array<std::size_t, 4> object_counts() const;
+  // Returns the newest body and joint, 0 for none.
+  std::array<Id, 2> newest_objects() const;
+  // Returns the bodies and joints that were created after some that still exist, or after none.
+  std::array<std::vector<Id>, 2> objects_since(const std::array<Id, 2>& newest) const;
   bool has_body(Id id) const { return bodies_.find(id) != nullptr; }
   bool has_fixture(Id id) const { return fixtures_.find(id) != nullptr; }
   bool has_joint(Id id) const { return joints_.find(id) != nullptr; }
@@ -166,6 +170,9 @@ class World final : private b2DestructionListener {
   // To be called after each change of what the world consists of: objects, the properties of
   // fixtures, and the poses of static bodies.
   void structure_changed();
+  // To be called after each call of Box2D that may have set the mass of a body. Establishes what
+  // depends on the mass: the least mass, and the springs of joints.
+  void mass_changed(b2Body* body);
   void set_material(const b2Fixture* fixture, const Material& material);
   // To be called after a change of the filter or the sensor flag of a fixture.
   void fixture_changed(const b2Fixture* fixture);

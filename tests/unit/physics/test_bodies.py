@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -335,6 +336,82 @@ def test_the_mass_of_scaled_shapes_is_limited(world: PhysicsWorld) -> None:
     assert body.fixtures[0].radius == 30.0
     body.scale_shapes(1.2)
     assert body.fixtures[0].radius == pytest.approx(36.0)
+
+
+def massless(world: PhysicsWorld, radius: float = 0.2) -> PhysicsBody:
+    body = world.create_body("dynamic", (0, 0, 0))
+    body.create_circle((0.3, 0), radius, density=0.0)
+    return body
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda body: body.scale_shapes(1.5),
+        lambda body: body.scale_shapes(0.5),
+        lambda body: setattr(body.fixtures[0], "density", 0.0),
+        lambda body: (
+            setattr(body.fixtures[0], "density", 5.0),
+            setattr(body.fixtures[0], "density", 0.0),
+        ),
+        lambda body: body.create_polygon([(0, 0), (1, 0), (0, 1)], density=0.0),
+        lambda body: body.create_circle((0, 0), 0.0, density=1.0),
+        lambda body: setattr(body.fixtures[0], "is_sensor", True),
+    ],
+)
+def test_a_body_without_density_keeps_its_mass_of_one_kilogram(
+    world: PhysicsWorld, change: Callable[[PhysicsBody], object]
+) -> None:
+    body = massless(world)
+    saved = world.copy()
+    change(body)
+    for each in (body, world.copy().body(body.id)):
+        assert (each.mass, each.inertia) == (1.0, 0.0)
+        assert each.local_center == (0.0, 0.0)
+    world.become_copy_of(saved)
+    assert body.mass == 1.0
+    change(body)
+    body.apply_force((1.0, 0.0), (0.0, 0.0))
+    world.step(STEP, 10, 10)
+    assert body.velocity == pytest.approx((STEP, 0.0, 0.0))
+
+
+def test_a_body_with_density_has_the_mass_of_its_shapes_after_each_change(
+    world: PhysicsWorld,
+) -> None:
+    body = massless(world)
+    body.fixtures[0].density = 2.0
+    assert body.mass == pytest.approx(2.0 * math.pi * 0.2**2)
+    assert body.local_center == pytest.approx((0.3, 0.0))
+    body.scale_shapes(2.0)
+    assert body.mass == pytest.approx(2.0 * math.pi * 0.4**2)
+    body.fixtures[0].density = 0.0
+    assert (body.mass, body.inertia, body.local_center) == (1.0, 0.0, (0.0, 0.0))
+
+
+@pytest.mark.parametrize("factor", [0.1, 10.0])
+def test_shapes_that_are_scaled_again_and_again_stay_in_the_range_of_the_engine(
+    world: PhysicsWorld, factor: float
+) -> None:
+    def add(body: PhysicsBody) -> None:
+        body.create_polygon([(0.1, 0), (0.3, 0), (0.2, 0.2)], density=1.0)
+        body.create_circle((0.0, 0.1), 0.2, density=1.0)
+
+    for kind in ("dynamic", "kinematic", "static"):
+        body = world.create_body(kind, (0, 0, 0))
+        add(body)
+        for _ in range(40):
+            before = [shape.vertices.tolist() for shape in body.fixtures], body.mass
+            try:
+                body.scale_shapes(factor)
+            except ValueError:
+                break
+        assert ([shape.vertices.tolist() for shape in body.fixtures], body.mass) == before
+        world.step(STEP, 10, 10)
+        assert all(math.isfinite(number) for number in body.pose)
+        with pytest.raises(ValueError, match=r"mass|area|corner|center|radius"):
+            body.scale_shapes(factor)
+        body.destroy()
 
 
 def test_motions_of_several_bodies_are_read_in_one_call(world: PhysicsWorld) -> None:

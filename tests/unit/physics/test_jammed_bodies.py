@@ -325,3 +325,35 @@ def test_rays_do_not_hit_a_body_that_has_overflowed() -> None:
     for cast in (world.cast_rays, world.cast_rays_reference):
         fractions, _ = cast((*start, 0), ends, 0xFFFF)
         assert np.isnan(fractions).all()
+
+
+@pytest.mark.parametrize("wait", [0, 2])
+def test_a_new_body_has_not_been_jammed(wait: int) -> None:
+    """It takes the slot of the jammed body, but moves as in a world without that body."""
+
+    def run(is_jammed: bool) -> list[object]:
+        world = PhysicsWorld()
+        robot, _ = jammed_robot(world)
+        floor = world.create_body("static", (0, 0, 0))
+        floor.create_edges([(-50, 2.85, 50, 2.85)])
+        limited = 0
+        for _ in range(3000):
+            robot.drive()
+            limited = limited + 1 if is_jammed and world.step(*STEP) is not None else 0
+            if limited >= 30 or not is_jammed:
+                break
+        assert not is_jammed or limited == 30
+        robot.body.destroy()
+        for _ in range(wait):
+            world.step(*STEP)
+        body = world.create_body("dynamic", (2.0, 3.0501, 0))
+        assert body.id % 2**32 == robot.body.id % 2**32
+        body.create_circle((0, 0), 0.2, density=1.0)
+        motions: list[object] = []
+        for _ in range(100):
+            body.set_velocity(0.5, -3.0, 0)
+            report = world.step(*STEP)
+            motions.append((report is not None, body.pose))
+        return motions
+
+    assert run(True) == run(False)
