@@ -144,7 +144,10 @@ class World:
             self, self._observers, self.requests, self._faults, plugin_timeout
         )
         self.ports: PortRegistry = PortRegistry(
-            self._observers, self._faults.add_of_subscriber, self.plugin_host.jobs.change
+            self._observers,
+            self._faults.add_of_subscriber,
+            self.plugin_host.jobs.change,
+            self.plugin_host.find_owner,
         )
         self._contacts = self.plugin_host.contacts
         self._layers = LayerSet(
@@ -792,7 +795,11 @@ class World:
         """Notifies an observer of all events from now on."""
         check_kind("observer", observer, WorldObserver, "a WorldObserver")
         observer.attached(self)
-        self._observers.add(observer)
+        owner = self.plugin_host.find_owner(None)
+        if owner is None:
+            self._observers.add(observer)
+        else:
+            self._observers.add_of_plugin(observer, owner)
         self.physics.jobs.interrupt()
 
     def remove_observer(self, observer: WorldObserver) -> None:

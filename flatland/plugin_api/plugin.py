@@ -82,6 +82,7 @@ class FlatlandPlugin:
     _declared: set[tuple[str, str]]
     _jobs: list[Update | Controller | Crowd]
     _touch_collectors: list[Touches]
+    _endings: list[Callable[[], None]]
     _is_initialized: bool
     _detached: bool
     _label: str
@@ -113,12 +114,16 @@ class FlatlandPlugin:
         self._jobs = []
         self._is_initialized = False
         self._touch_collectors = []
+        self._endings = []
         self._detached = False
         self._label = describe(self)
 
     def _detach(self) -> None:
         """Closes all ports and removes all transforms that the plugin has not closed or removed."""
         self._detached = True
+        for end in self._endings:
+            end()
+        self._endings.clear()
         for output in self._outputs:
             self.world.ports.close_output(output, self._label)
         for command in self._commands:
@@ -131,6 +136,10 @@ class FlatlandPlugin:
         self.world.transform_buffer.forget(self, self._sent | self._declared)
         self._sent.clear()
         self._declared.clear()
+
+    def call_at_end(self, function: Callable[[], None]) -> None:
+        """Calls a function after `on_shutdown`, or after a failed start."""
+        self._endings.append(function)
 
     def output(self, topic: str, value_type: builtins.type[T]) -> Output[T]:
         """Declares a stream of values.
@@ -415,7 +424,8 @@ class FlatlandPlugin:
 
     def _command_state(self) -> list[tuple[str, int, Any]]:
         """Returns the values of the commands, for `World.state_hash`."""
-        return [(command.topic, command.received, command.value) for command in self._commands]
+        states = [(command.topic, *command.state) for command in self._commands]
+        return [(topic, received, value) for topic, value, received in states]
 
     def _resolve(self, topic: str) -> str:
         if self._detached:

@@ -9,7 +9,13 @@ from typing import Any, Protocol, TypeVar
 
 from flatland.errors import FlatlandError, WorldError
 from flatland.graph_names import global_name
-from flatland.plugin_api.ports import Command, CommandTopic, Output, SubscriberFault
+from flatland.plugin_api.ports import (
+    Command,
+    CommandTopic,
+    Output,
+    OwnerFinder,
+    SubscriberFault,
+)
 
 T = TypeVar("T")
 
@@ -38,6 +44,7 @@ class PortRegistry:
         observer: PortObserver,
         on_fault: SubscriberFault | None = None,
         on_wanted: Callable[[], None] | None = None,
+        find_owner: OwnerFinder | None = None,
     ) -> None:
         """Creates an empty registry.
 
@@ -45,10 +52,12 @@ class PortRegistry:
             observer: Notified when ports open and close.
             on_fault: Called with the exceptions of subscribers of outputs, see `Output`.
             on_wanted: Called from any thread when an output may be wanted or not any more.
+            find_owner: Returns who makes a subscription, see `Output`.
         """
         self._observer = observer
         self._on_fault = on_fault
         self._on_wanted = on_wanted
+        self._find_owner = find_owner
         self._outputs: dict[str, Output[Any]] = {}
         self._commands: dict[str, list[Command[Any]]] = {}
         # Ports that were closed and may be opened again, None if they are not kept.
@@ -121,7 +130,7 @@ class PortRegistry:
             output.owners.append(owner)
             self._outputs[output.topic] = output
             return output
-        output = Output(name, value_type, owner, self._on_fault, self._on_wanted)
+        output = Output(name, value_type, owner, self._on_fault, self._on_wanted, self._find_owner)
         self._observer.output_opened(output)
         self._outputs[output.topic] = output
         return output

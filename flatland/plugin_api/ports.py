@@ -6,6 +6,7 @@ ROS bridge, a test or a notebook finds both by their resolved topic in the `Port
 
 from __future__ import annotations
 
+import functools
 import threading
 from collections.abc import Callable, Hashable
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
@@ -18,6 +19,37 @@ from flatland.uncopied import uncopied
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 SubscriberFault = Callable[["Output[Any]", Callable[[Any], None], BaseException], None]
+OwnerFinder = Callable[[object], "PortUser | None"]
+OwnedSubscription = tuple["Output[Any]", "Token", Callable[[Any], None], bool]
+
+
+class PortUser(Protocol):
+    """A plugin, or the plugins of a world, by which an output is used."""
+
+    def call_at_end(self, function: Callable[[], None]) -> None:
+        """Calls a function when the user ends."""
+
+
+class Token:
+    """Identifies a subscription of an output.
+
+    Attributes:
+        owner: The plugin that has made it, or its world if it is not known which plugin has; None
+            if it was made outside of the world. A clone has copies of those with an owner.
+    """
+
+    __slots__ = ("owner",)
+
+    def __init__(self, owner: PortUser | None) -> None:
+        """Creates the identity of a new subscription."""
+        self.owner = owner
+
+
+def callback_name(callback: object) -> str:
+    """Returns the name of a function, for messages."""
+    while isinstance(callback, functools.partial):
+        callback = callback.func
+    return getattr(callback, "__qualname__", None) or repr(callback)
 
 
 @uncopied("World.clone() copies a world with its outputs")
@@ -34,12 +66,15 @@ class Output(Generic[T]):
     """
 
     outside_state: ClassVar[dict[str, Callable[[], object]]] = {
+        "_inner_wanters": frozenset,
         "_lock": threading.Lock,
         "_subscribers": tuple,
         "_wanters": frozenset,
     }
 
     __slots__ = (
+        "_find_owner",
+        "_inner_wanters",
         "_lock",
         "_on_fault",
         "_on_wanted",
@@ -60,6 +95,7 @@ class Output(Generic[T]):
         owner: str = "",
         on_fault: SubscriberFault | None = None,
         on_wanted: Callable[[], None] | None = None,
+        find_owner: OwnerFinder | None = None,
     ) -> None:
         """Creates an output without subscribers.
 
@@ -70,6 +106,8 @@ class Output(Generic[T]):
             on_fault: Called with the exception of a subscriber, which then does not reach the
                 plugin that emits; None to propagate it.
             on_wanted: Called from any thread when `wanted` may have changed.
+            find_owner: Returns who makes a subscription, by its callback, or by None for a demand;
+                see `Token`.
         """
         self.name = name
         self.topic = global_name(name)
@@ -79,11 +117,13 @@ class Output(Generic[T]):
         self.closed = False
         self._on_fault = on_fault
         self._on_wanted = on_wanted
-        # Both are replaced and never modified, so that other threads may read them at any time; the
+        self._find_owner = find_owner
+        # All are replaced and never modified, so that other threads may read them at any time; the
         # lock serializes the replacements.
         self._lock = threading.Lock()
-        self._subscribers: tuple[tuple[object, Callable[[T], None]], ...] = ()
+        self._subscribers: tuple[tuple[Token, Callable[[T], None]], ...] = ()
         self._wanters: frozenset[Hashable] = frozenset()
+        self._inner_wanters: frozenset[Hashable] = frozenset()  # on behalf of plugins
 
     @property
     def wanted(self) -> bool:
@@ -92,12 +132,18 @@ class Output(Generic[T]):
 
     def want(self, who: Hashable) -> None:
         """Marks the output as wanted on behalf of `who`; safe from any thread."""
+        owner = None if self._find_owner is None else self._find_owner(None)
+        if owner is not None:
+            owner.call_at_end(lambda: self.unwant(who))
         with self._lock:
+            if owner is not None:
+                self._inner_wanters |= {who}
             self._set_wanters(self._wanters | {who})
 
     def unwant(self, who: Hashable) -> None:
         """Reverts `want` for `who`; safe from any thread."""
         with self._lock:
+            self._inner_wanters -= {who}
             self._set_wanters(self._wanters - {who})
 
     def _set_wanters(self, wanters: frozenset[Hashable]) -> None:
@@ -138,24 +184,45 @@ class Output(Generic[T]):
                 calls `want` and `unwant` itself.
 
         Returns:
-            A function that ends this subscription; further calls have no effect.
+            A function that ends this subscription; further calls have no effect. A subscription
+            that a plugin makes also ends with the plugin.
 
         Raises:
             TypeError: `callback` is no function.
         """
         check_function("callback", callback)
-        token = object()
+        owner = None if self._find_owner is None else self._find_owner(callback)
+        token = Token(owner)
         with self._lock:
             self._subscribers = (*self._subscribers, (token, callback))
             if wants:
                 self._set_wanters(self._wanters | {token})
+        if owner is not None:
+            owner.call_at_end(lambda: self.unsubscribe(token))
+        return lambda: self.unsubscribe(token)
 
-        def unsubscribe() -> None:
-            with self._lock:
-                self._subscribers = tuple(s for s in self._subscribers if s[0] is not token)
-                self._set_wanters(self._wanters - {token})
+    def unsubscribe(self, token: Token) -> None:
+        """Ends a subscription; idempotent, and safe from any thread."""
+        with self._lock:
+            self._subscribers = tuple(s for s in self._subscribers if s[0] is not token)
+            self._set_wanters(self._wanters - {token})
 
-        return unsubscribe
+    @property
+    def of_plugins(self) -> list[OwnedSubscription]:
+        """The subscriptions of plugins, and whether each of them wants the output."""
+        return [
+            (self, token, callback, token in self._wanters)
+            for token, callback in self._subscribers
+            if token.owner is not None
+        ]
+
+    def resume(self, token: Token, callback: Callable[[T], None], *, wants: bool) -> None:
+        """Continues a subscription that may have ended."""
+        self.unsubscribe(token)
+        with self._lock:
+            self._subscribers = (*self._subscribers, (token, callback))
+            if wants:
+                self._set_wanters(self._wanters | {token})
 
 
 class CommandSource(Protocol[T_co]):
@@ -183,15 +250,17 @@ class Command(Generic[T]):
         value_type: Type of the values.
         owner: Name of the plugin that opened it, for messages.
         closed: Whether the plugin has ended.
-        on_change: Called after `value` was set, in any thread; None for no function.
+        on_change: Called after `state` was set, in any thread; None for no function.
     """
 
     outside_state: ClassVar[dict[str, Callable[[], object]]] = {
+        "_lock": threading.Lock,
         "_on_set": lambda: None,
         "_source": lambda: None,
     }
 
     __slots__ = (
+        "_lock",
         "_on_set",
         "_received",
         "_source",
@@ -226,6 +295,7 @@ class Command(Generic[T]):
         self.owner = owner
         self.topic = global_name(name)
         self.value_type = value_type
+        self._lock = threading.Lock()  # held while the value and the number are replaced
         self._value = default
         self._received = 0
         self.closed = False
@@ -235,21 +305,40 @@ class Command(Generic[T]):
         self.on_change: Callable[[], None] | None = None
 
     @property
+    def state(self) -> tuple[T, int]:
+        """The last value accepted or the default, and the number of values accepted.
+
+        They belong together, also while another thread sets the command.
+        """
+        with self._lock:
+            source = self._source
+            if source is None:
+                return self._value, self._received
+            return source.value, self._received + source.received
+
+    @property
     def value(self) -> T:
         """The last value accepted, or the default."""
-        return self._value if self._source is None else self._source.value
+        source = self._source  # Another thread may end it.
+        return self._value if source is None else source.value
 
     @value.setter
     def value(self, value: T) -> None:
-        self.settle()
-        self._value = value
-        if self.on_change is not None:
-            self.on_change()
+        self._replace(value, 0)
 
     @property
     def received(self) -> int:
         """Number of values accepted."""
-        return self._received + (0 if self._source is None else self._source.received)
+        return self.state[1]
+
+    def _replace(self, value: T, count: int) -> None:
+        """Sets the value, counts it, and only then notifies the plugin."""
+        self.settle()
+        with self._lock:
+            self._value = value
+            self._received += count
+        if self.on_change is not None:
+            self.on_change()
 
     @property
     def on_set(self) -> Callable[[Command[T], T], None] | None:
@@ -271,10 +360,14 @@ class Command(Generic[T]):
 
     def settle(self) -> None:
         """Keeps the last value of a source, which must not pass further values to the plugin."""
-        if self._source is not None:
-            source = self._source
-            self._value, self._received = source.value, self.received
-            self._source = None
+        if self._source is None:
+            return
+        with self._lock:
+            source, self._source = self._source, None
+            if source is not None:
+                self._value = source.value
+                self._received += source.received
+        if source is not None:
             source.settled()
 
     def renew(self, new: Command[T]) -> None:
@@ -297,8 +390,7 @@ class Command(Generic[T]):
         if self.on_set is not None:
             self.on_set(self, value)
         if self.accept is None or self.accept(value):
-            self.value = value
-            self._received += 1
+            self._replace(value, 1)
 
 
 @uncopied("World.clone() copies a world with its commands")

@@ -83,13 +83,15 @@ class Hitch(ModelPlugin):
     def _obey(self) -> None:
         """Carries out the last command once; logs a warning if that is not possible."""
         is_start = self._handled < 0
-        if self._handled == self._command.received:
+        is_wanted, received = self._command.state
+        if self._handled == received:
             return
-        if not self._command.value:
-            self.release()
+        self._handled = received
+        if not is_wanted:
+            self._disconnect()
             return
         try:
-            self.connect()
+            self._connect_model(None)
         except WorldError as error:
             if not is_start:
                 self._warning.log("%s", error)
@@ -139,6 +141,9 @@ class Hitch(ModelPlugin):
     def connect(self, name: str | None = None) -> None:
         """Connects a model at once; see `attach`."""
         self._handled = self._command.received
+        self._connect_model(name)
+
+    def _connect_model(self, name: str | None) -> None:
         connected = self.hitched
         if connected is not None:
             if name in (None, connected.name):

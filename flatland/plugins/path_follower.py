@@ -80,9 +80,9 @@ class PathFollower(ModelPlugin):
         command = self._start_command
         if command is None:
             return
-        if command.value:
-            self._starts = command.received
-        self._is_started = command.value
+        self._is_started, received = command.state
+        if self._is_started:
+            self._starts = received
         self._controller.set_start(self._is_started, self._starts)
 
     @property

@@ -213,7 +213,7 @@ class ContactReporter:
         if name == "post_solve":
             arguments.append(ContactImpulse(event.normal_impulses, event.tangent_impulses))
         for plugin, method in hooks:
-            self._call(plugin, name, method, *arguments)
+            self._call(plugin, name, name, method, *arguments)
 
     def _find(self, name: str, body_a: Body, body_b: Body) -> HookList:
         return self._hooks[name].between(body_a.entity, body_b.entity, self._order)
@@ -225,4 +225,4 @@ class ContactReporter:
         fixtures = (body_a.fixture(raw.fixture_a), body_b.fixture(raw.fixture_b))
         contact = MutableContact(raw, body_a, body_b, *fixtures)
         for plugin, method in self._find(_PRE_SOLVE, body_a, body_b):
-            self._call(plugin, _PRE_SOLVE, method, contact, old_manifold)
+            self._call(plugin, _PRE_SOLVE, _PRE_SOLVE, method, contact, old_manifold)

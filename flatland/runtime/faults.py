@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import logging
 import time
+import types
 from collections import Counter
 from collections.abc import Callable, Hashable
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, get_args
 
 from flatland.errors import PluginError
+from flatland.plugin_api.ports import callback_name
 
 if TYPE_CHECKING:
     from flatland.plugin_api.ports import Output
@@ -27,12 +30,13 @@ class Faults:
     No such exception interrupts a step: all other hooks, subscribers and observers are still
     called. With the policy `raise`, the first exception is kept, and `World.step` raises it when
     the step is complete. With the policy `disable`, exceptions are logged, with one traceback a
-    second and source at most, and a plugin is disabled after `MAX_FAULTS` exceptions of one hook
-    in a row.
+    second and source at most, and a plugin is disabled after `MAX_FAULTS` exceptions of one of its
+    functions in a row.
 
     Attributes:
         first: The exception that `raise_first` raises, None if there is none.
-        counts: Exceptions in a row of each (plugin, hook) whose last call raised.
+        counts: Exceptions in a row of each (plugin, function) whose last call raised; see
+            `add_of_plugin`.
     """
 
     outside_state: ClassVar[dict[str, Callable[[], object]]] = {
@@ -67,15 +71,23 @@ class Faults:
             return
         now = time.monotonic()
         if now - self._last_log.get(source, -_LOG_PERIOD) >= _LOG_PERIOD:
+            # Sources such as functions that are created anew must not accumulate.
+            self._last_log = {
+                other: last for other, last in self._last_log.items() if now - last < _LOG_PERIOD
+            }
             self._last_log[source] = now
             _LOG.error("%s raised", what, exc_info=error)
 
-    def add_in_hook(self, plugin: Hashable, hook: str, name: str, error: BaseException) -> bool:
-        """Records or logs an exception of a hook; to be called while the exception is handled.
+    def add_of_plugin(
+        self, plugin: Hashable, hook: str, source: Hashable, name: str, error: BaseException
+    ) -> bool:
+        """Records or logs an exception of a plugin; to be called while the exception is handled.
 
         Args:
             plugin: The plugin.
-            hook: Name of the hook.
+            hook: Name of the hook as part of which the function was called, for the log.
+            source: What identifies the function among those of the plugin: the id of a job, the
+                name of a hook, or the function itself.
             name: Description of the plugin, for the log.
             error: The exception.
 
@@ -85,8 +97,9 @@ class Faults:
         self.add(plugin, f"{name}: {hook}", error)
         if self._raises:
             return False
-        self.counts[plugin, hook] += 1
-        if self.counts[plugin, hook] < MAX_FAULTS:
+        key = plugin, _identity(source)
+        self.counts[key] += 1
+        if self.counts[key] < MAX_FAULTS:
             return False
         _LOG.error(
             "%s: %s raised %d times in a row, the plugin is disabled", name, hook, MAX_FAULTS
@@ -97,12 +110,12 @@ class Faults:
         self, output: Output[Any], callback: Callable[[Any], None], error: BaseException
     ) -> None:
         """Records or logs an exception of a subscriber; to be called while it is handled."""
-        name = getattr(callback, "__qualname__", None) or repr(callback)
-        self.add(callback, f'subscriber {name} of output "{output.topic}"', error)
+        name = callback_name(callback)
+        self.add(_identity(callback), f'subscriber {name} of output "{output.topic}"', error)
 
-    def succeeded(self, plugin: Hashable, hook: str) -> None:
-        """Resets the count of a hook that returned."""
-        self.counts.pop((plugin, hook), None)
+    def succeeded(self, plugin: Hashable, source: Hashable) -> None:
+        """Resets the count of a function that returned; see `add_of_plugin`."""
+        self.counts.pop((plugin, _identity(source)), None)
 
     def forget(self, plugins: set[Hashable]) -> None:
         """Drops the records of plugins that no longer exist."""
@@ -116,6 +129,18 @@ class Faults:
         if self.first is not None:
             error, self.first = self.first, None
             raise error
+
+
+def _identity(source: Hashable) -> Hashable:
+    """Returns what is equal for two calls of one function, even if the object is created anew.
+
+    A lambda or a local function is identified by its code.
+    """
+    while isinstance(source, functools.partial):
+        source = source.func
+    if isinstance(source, int | str | tuple | types.MethodType):
+        return source
+    return getattr(source, "__code__", type(source))
 
 
 def _raisable(what: str, error: BaseException) -> BaseException:

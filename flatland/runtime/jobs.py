@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Callable, Container, Iterator, Sequence
-from dataclasses import dataclass
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from flatland.errors import PLUGIN_FAULTS
@@ -14,10 +16,11 @@ from flatland.plugin_api.updates import STEP_HOOKS, Update
 
 if TYPE_CHECKING:
     from flatland.physics import JobQueue
+    from flatland.runtime.faults import Faults
     from flatland.timekeeper import Timekeeper
 
-Call = Callable[[FlatlandPlugin, str, Callable[..., object], Any], None]
-FaultHandler = Callable[[FlatlandPlugin, str, BaseException], None]
+Call = Callable[..., None]
+LaterCall = tuple[FlatlandPlugin, Callable[[], None]]
 
 _AFTER_MODELS = 1 << 62  # added to the orders of world plugins
 
@@ -41,33 +44,66 @@ class Job:
     was_called: bool = False
 
 
+@dataclass(slots=True, eq=False)
+class ControllerJob:
+    """A controller of a plugin in the queue of the core.
+
+    Attributes:
+        plugin: The plugin.
+        failed_at: Simulated time of the last failure before and after the physics step [ns].
+    """
+
+    plugin: FlatlandPlugin
+    failed_at: dict[bool, int] = field(default_factory=dict)
+
+
 class Jobs:
     """The updates and controllers of plugins, in the order in which the plugins were loaded.
 
     Those of model plugins precede those of world plugins. The queue of the core (`JobQueue`) has
     one callback for each update, and decides when it is due. This class decides whether its result
-    is wanted, and calls the functions.
+    is wanted, and calls the functions. Jobs are added and removed between two steps only.
     """
 
-    def __init__(self, queue: JobQueue, timekeeper: Timekeeper, on_fault: FaultHandler) -> None:
+    def __init__(
+        self,
+        queue: JobQueue,
+        timekeeper: Timekeeper,
+        call: Call,
+        faults: Faults,
+        disabled: Container[FlatlandPlugin],
+        in_hook: Callable[[], AbstractContextManager[None]],
+    ) -> None:
         """Creates jobs without plugins.
 
         Args:
             queue: The queue of the core.
             timekeeper: The simulated time.
-            on_fault: Called as `on_fault(plugin, hook, error)` with exceptions of plugins.
+            call: Calls a function of a plugin and takes what it raises, see `PluginHost.call`.
+            faults: The counts of exceptions.
+            disabled: The plugins whose functions are not called any more.
+            in_hook: Returns a block in which hooks of plugins run.
         """
         self._queue = queue
         self._timekeeper = timekeeper
-        self._on_fault = on_fault
+        self._call = call
+        self._faults = faults
+        self._disabled = disabled
+        self._in_hook = in_hook
         self._order: dict[FlatlandPlugin, int] = {}
         self._count = 0
         self._jobs: dict[int, Job] = {}
-        self._controllers: dict[int, FlatlandPlugin] = {}
-        self._groups: dict[Callable[..., object], int] = {}
+        self._controllers: dict[int, ControllerJob] = {}
+        # By the function `prepare` of updates: the number of the group and of its updates.
+        self._groups: dict[Callable[..., object], tuple[int, int]] = {}
+        self._last_group = 0
         self._is_stale = False
         self._transforms_wanted = False
-        self._later: deque[tuple[FlatlandPlugin, Callable[[], None]]] = deque()
+        self._later: deque[LaterCall] = deque()
+        # Those that were added by a function of `_later`, and the thread that calls these now.
+        self._repeated: deque[LaterCall] = deque()
+        self._is_repeated_due = True
+        self._caller = 0
 
     # -- plugins ---------------------------------------------------------------------------
 
@@ -83,14 +119,14 @@ class Jobs:
             else:
                 job.set_place(order, number)
                 if isinstance(job, Controller):
-                    self._controllers[job.id] = plugin
+                    self._controllers[job.id] = ControllerJob(plugin)
         self._is_stale = True
 
     def _add_update(self, plugin: FlatlandPlugin, update: Update, place: tuple[int, int]) -> None:
-        group = 0
+        group, touches = 0, update.touches
         if update.prepare is not None:
-            group = self._groups.setdefault(update.prepare, len(self._groups) + 1)
-        touches = update.touches
+            group, users = self._groups.get(update.prepare, (self._last_group + 1, 0))
+            self._last_group = max(self._last_group, group)
         callback = self._queue.add_callback(
             place,
             update.timer.clock(self._timekeeper.step_size_ns),
@@ -103,26 +139,36 @@ class Jobs:
         )
         update.on_change = self.change
         self._jobs[callback] = Job(plugin, update, callback)
+        if update.prepare is not None:
+            self._groups[update.prepare] = group, users + 1
 
     def remove(self, plugin: FlatlandPlugin) -> None:
-        """Removes the jobs of a plugin; one without jobs is ignored."""
-        if plugin not in self._order:
-            return
-        self.settle()
-        del self._order[plugin]
-        for job in [job for job in self._jobs.values() if job.plugin is plugin]:
-            del self._jobs[job.id]
-            self._queue.remove_callback(job.id)
+        """Removes the jobs of a plugin, also those that could only partly be added; idempotent."""
+        if plugin in self._order:
+            self.settle()
+            del self._order[plugin]
+            for job in [job for job in self._jobs.values() if job.plugin is plugin]:
+                del self._jobs[job.id]
+                self._queue.remove_callback(job.id)
+                self._leave_group(job.update)
         for declared in plugin._jobs:
             if isinstance(declared, Controller | Crowd):
                 self._controllers.pop(declared.id, None)
                 if declared.alive:
                     declared.remove()
-        # Other threads may add more meanwhile.
-        for _ in range(len(self._later)):
-            entry = self._later.popleft()
-            if entry[0] is not plugin:
-                self._later.append(entry)
+        for later in (self._later, self._repeated):
+            # Other threads may add more meanwhile.
+            for _ in range(len(later)):
+                entry = later.popleft()
+                if entry[0] is not plugin:
+                    later.append(entry)
+
+    def _leave_group(self, update: Update) -> None:
+        if update.prepare is None:
+            return
+        group, users = self._groups.pop(update.prepare)
+        if users > 1:
+            self._groups[update.prepare] = group, users - 1
 
     def __contains__(self, plugin: FlatlandPlugin) -> bool:
         """Returns whether a plugin was added and not removed."""
@@ -152,16 +198,14 @@ class Jobs:
             if job.plugin in plugins:
                 job.was_called = True
 
-    @property
-    def is_pending(self) -> bool:
-        """Whether `refresh` has something to do for the next step."""
-        return self._is_stale or bool(self._later)
-
-    def refresh(self, transforms_wanted: bool) -> None:
+    def refresh(self, transforms_wanted: bool) -> bool:
         """Prepares the next step: passes new commands, and finds out which updates are wanted.
 
         Args:
             transforms_wanted: Whether an observer wants transforms.
+
+        Returns:
+            Whether functions are to be called again before the step after the next one.
         """
         if self._is_stale or transforms_wanted != self._transforms_wanted:
             self._is_stale = False
@@ -174,56 +218,72 @@ class Jobs:
                         self.settle()
                     job.is_called = is_called
                     self._queue.set_called(job.id, is_called)
-        self.call_later()
+        if self._repeated and self._is_repeated_due:
+            self._later.extend(self._repeated)
+            self._repeated.clear()
+        self._is_repeated_due = True
+        if self._later:
+            self.call_later()
+        return bool(self._repeated)
+
+    def keep_repeated(self) -> None:
+        """Has the next `refresh` prepare the same step as the last one."""
+        self._is_repeated_due = False
 
     def settle(self) -> None:
         """Reports updates without a call to the plugins, in order."""
         if not self._jobs:
             return
         skipped = {self._jobs[row[0]]: row for row in self._queue.take_skipped()}
-        for job in sorted(skipped, key=lambda job: self._order[job.plugin]):
-            _, count, stamp, poses = skipped[job]
-            if job.update.skipped is not None:
-                try:
-                    job.update.skipped(count, stamp, poses)
-                except PLUGIN_FAULTS as error:
-                    self._on_fault(job.plugin, STEP_HOOKS[job.update.phase], error)
+        if not skipped:
+            return
+        with self._in_hook():
+            for job in sorted(skipped, key=lambda job: self._order[job.plugin]):
+                callback, *arguments = skipped[job]
+                update = job.update
+                if update.skipped is not None:
+                    hook, source = STEP_HOOKS[update.phase], (callback, "skipped")
+                    self._call(job.plugin, hook, source, update.skipped, *arguments)
 
     # -- calls -----------------------------------------------------------------------------
 
     def set_later(self, plugin: FlatlandPlugin, function: Callable[[], None]) -> None:
-        """Calls a function of a plugin before the next step; safe from any thread."""
+        """Calls a function of a plugin before the next step; safe from any thread.
+
+        If a function that `call_later` calls uses this, that is the step after the one that is
+        being prepared.
+        """
+        if self._caller == threading.get_ident():
+            self._repeated.append((plugin, function))
+            return
         self._later.append((plugin, function))
         self._queue.interrupt()
 
     def call_later(self) -> None:
-        """Calls the functions that were passed to `set_later`."""
+        """Calls the functions that were passed to `set_later`, once each."""
         later = self._later
-        while later:
-            plugin, function = later.popleft()
-            try:
-                function()
-            except PLUGIN_FAULTS as error:
-                self._on_fault(plugin, STEP_HOOKS["before"], error)
+        self._caller = threading.get_ident()
+        try:
+            for _ in range(len(later)):
+                plugin, function = later.popleft()
+                self._call(plugin, STEP_HOOKS["before"], function, function)
+        finally:
+            self._caller = 0
 
-    def call(self, callbacks: Sequence[int], call: Call, *, one_by_one: bool) -> None:
+    def call(self, callbacks: Sequence[int], *, one_by_one: bool) -> None:
         """Calls the functions of updates that are due.
 
         Args:
             callbacks: Ids of their callbacks, in order.
-            call: Calls a function of a plugin and takes what it raises, as
-                `call(plugin, hook, function, timekeeper)`.
             one_by_one: Whether no update is to be prepared together with others.
         """
-        timekeeper = self._timekeeper
+        timekeeper, call = self._timekeeper, self._call
         if len(callbacks) > 1 and self._groups and not one_by_one:
             self._prepare(callbacks)
         for callback in callbacks:
-            job = self._jobs.get(callback)
-            if job is None:
-                continue  # Its plugin was disabled during this step.
+            job = self._jobs[callback]
             update = job.update
-            call(job.plugin, STEP_HOOKS[update.phase], update.function, timekeeper)
+            call(job.plugin, STEP_HOOKS[update.phase], callback, update.function, timekeeper)
             if not job.was_called:
                 job.was_called = self._is_stale = True
             if self._later:
@@ -243,11 +303,12 @@ class Jobs:
     def _groups_of(
         self, callbacks: Sequence[int]
     ) -> Iterator[tuple[Callable[[Sequence[Any]], object], list[FlatlandPlugin]]]:
-        jobs = [self._jobs[callback] for callback in callbacks]
+        found = (self._jobs[callback] for callback in callbacks)
+        jobs = [job for job in found if job.plugin not in self._disabled]
         start = 0
         for end in range(1, len(jobs) + 1):
             prepare = jobs[start].update.prepare
-            if end < len(jobs) and jobs[end].update.prepare is prepare:
+            if end < len(jobs) and jobs[end].update.prepare == prepare:
                 continue
             if prepare is not None and end - start > 1:
                 yield prepare, [job.plugin for job in jobs[start:end]]
@@ -260,11 +321,19 @@ class Jobs:
             failures: Ids of the controllers, and their errors.
             is_after: Whether they failed after the physics step.
         """
+        now = self._timekeeper.sim_time_ns
         for controller, text in failures:
-            plugin = self._controllers.get(controller)
-            if plugin is not None:
-                hook = STEP_HOOKS["after" if is_after else "before"]
-                try:
-                    raise ValueError(text)
-                except ValueError as error:
-                    self._on_fault(plugin, hook, error)
+            job = self._controllers.get(controller)
+            if job is None:
+                continue
+            source = (controller, is_after)
+            # The core reports no successes: it has succeeded if it did not fail in the last step.
+            if job.failed_at.get(is_after) != now - self._timekeeper.step_size_ns:
+                self._faults.succeeded(job.plugin, source)
+            job.failed_at[is_after] = now
+            hook = STEP_HOOKS["after" if is_after else "before"]
+            self._call(job.plugin, hook, source, _fail, text)
+
+
+def _fail(text: str) -> None:
+    raise ValueError(text)

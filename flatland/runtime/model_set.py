@@ -218,13 +218,14 @@ class ModelSet:
         """Spawns models one after the other."""
         sources = self._new_sources()
         spawned: list[Model] = []
+        count, newest = len(self.by_name), self._physics.newest_objects
         try:
             for index, spec in enumerate(specs):
                 with _item(f"models[{index}]", index):
                     spawned.append(self._create(spec, if_blocked, sources))
         except BaseException:
-            for model in reversed(spawned):
-                self._discard(model)
+            self._undo_spawns(count, spawned)
+            self._destroy_unowned(newest)
             raise
         for model in spawned:
             self._announce(model, if_blocked)
@@ -300,7 +301,7 @@ class ModelSet:
     # -- changes of one model ---------------------------------------------------------------
 
     def _create(self, spec: ModelSpec, if_blocked: IfBlocked, sources: ModelSources) -> Model:
-        """Adds a model to the world; `_announce` or `_discard` must follow.
+        """Adds a model to the world; `_announce` or `_undo_spawns` must follow.
 
         Args:
             spec: The model.
@@ -316,6 +317,7 @@ class ModelSet:
         path, reader = sources.read(spec.yaml_path)
         model = self._make_model(name, spec.namespace, path)
         loader = ModelLoader(self._physics, self._collision_filter, model, reader)
+        count, newest = len(self.by_name), self._physics.newest_objects
         try:
             loader.load_bodies_and_joints(finite_pose(spec.pose))
             self._place(model, model.pose, if_blocked, "spawn")
@@ -324,7 +326,9 @@ class ModelSet:
                 with entry.collect_errors():
                     self._host.start_model_plugin(model, entry)
         except BaseException:
+            self._undo_spawns(count)
             self._remove(model)
+            self._destroy_unowned(newest)
             raise
         self.by_name[name] = model
         return model
@@ -335,12 +339,35 @@ class ModelSet:
             self._placement.warn_if_blocked(model)
         self._observers.model_added(model)
 
-    def _discard(self, model: Model) -> None:
-        """Removes a created model of which the observers were not notified."""
-        # A plugin of a later model may have deleted it.
-        if self.by_name.get(model.name) is model:
-            del self.by_name[model.name]
-            self._remove(model)
+    def _destroy_unowned(self, newest: tuple[int, int]) -> None:
+        """Destroys what the plugins of failed models have created besides models.
+
+        Args:
+            newest: Value of `PhysicsWorld.newest_objects` before the plugins were started.
+        """
+        bodies, joints = self._physics.objects_since(newest)
+        for joint in map(self._physics.joint, joints):
+            joint.destroy()
+        for body in map(self._physics.body, bodies):
+            if self._contacts.find_body(body) is None:
+                body.destroy()
+
+    def _undo_spawns(self, before: int, unannounced: Sequence[Model] = ()) -> None:
+        """Removes the newest models, also those that plugins have spawned meanwhile.
+
+        Args:
+            before: Number of models before.
+            unannounced: Models of which the observers were not notified.
+        """
+        for name, model in reversed(list(self.by_name.items())[before:]):
+            # A plugin that reacts to the end of a model may have deleted others.
+            if self.by_name.get(name) is not model:
+                continue
+            if model in unannounced:
+                del self.by_name[name]
+                self._remove(model)
+            else:
+                self.delete(name)
 
     def _put(self, model: Model, pose: Pose) -> None:
         """Moves a model to a pose, whether it is blocked or not.
@@ -396,8 +423,10 @@ class ModelSet:
         """Deletes a model; see `World.delete_model`."""
         model = self._find_to("delete", name)
         del self.by_name[name]
-        self._remove(model)
-        self._observers.model_removed(model)
+        try:
+            self._remove(model)
+        finally:
+            self._observers.model_removed(model)
 
     def clear(self) -> None:
         """Deletes all models, the last one first."""
@@ -463,14 +492,21 @@ class ModelSet:
 
     def _remove(self, model: Model) -> None:
         """Removes a complete or incomplete model; other plugins are notified of ended contacts."""
-        self._host.shut_down(model.plugins)
-        for joint in reversed(model.joints):
-            joint.destroy()
-        for body in reversed(model.bodies):
-            body.destroy()
-        with self._requests.hooks():
-            self._contacts.dispatch()
-        self._contacts.remove_bodies(model.bodies)
+        try:
+            self._host.shut_down(model.plugins)
+        finally:
+            # A plugin may have destroyed some of them.
+            for joint in reversed(model.joints):
+                if joint.alive:
+                    joint.destroy()
+            for body in reversed(model.bodies):
+                if body.alive:
+                    body.destroy()
+            try:
+                with self._requests.hooks():
+                    self._contacts.dispatch()
+            finally:
+                self._contacts.remove_bodies(model.bodies)
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from flatland.errors import PLUGIN_FAULTS
 if TYPE_CHECKING:
     from flatland.entities.model import Model
     from flatland.plugin_api.plugin import FlatlandPlugin
-    from flatland.plugin_api.ports import Command, Output
+    from flatland.plugin_api.ports import Command, Output, PortUser
     from flatland.runtime.faults import Faults
     from flatland.values import Transform
 
@@ -99,7 +99,13 @@ class WorldObserver:
 
 
 class Observers:
-    """The observers of one world, notified in the order in which they were added."""
+    """The observers of one world, notified in the order in which they were added.
+
+    Attributes:
+        is_notifying: Whether code of an observer runs.
+        of_plugins: The observers that plugins have added, with the plugins. A clone has copies of
+            them.
+    """
 
     def __init__(self, faults: Faults) -> None:
         """Creates an empty list.
@@ -108,6 +114,8 @@ class Observers:
             faults: Handles the exceptions of observers.
         """
         self._faults = faults
+        self.is_notifying = False
+        self.of_plugins: tuple[tuple[WorldObserver, PortUser], ...] = ()
         self._all: tuple[WorldObserver, ...] = ()
         # Notified in every step, so only those that override the method.
         self._of_time: tuple[WorldObserver, ...] = ()
@@ -128,8 +136,25 @@ class Observers:
         """
         if observer not in self._all:
             raise ValueError(f"{observer!r} is not an observer of this world")
+        self.of_plugins = tuple(pair for pair in self.of_plugins if pair[0] is not observer)
         self._set(tuple(other for other in self._all if other is not observer))
         self._call(observer, "detached")
+
+    def add_of_plugin(self, observer: WorldObserver, owner: PortUser) -> None:
+        """Adds an observer that ends with a plugin."""
+        self.add(observer)
+        self.of_plugins = (*self.of_plugins, (observer, owner))
+        owner.call_at_end(lambda: self._end(observer))
+
+    def resume(self, observer: WorldObserver, owner: PortUser) -> None:
+        """Adds an observer again that ended with its plugin."""
+        if observer not in self._all:
+            self.add(observer)
+            self.of_plugins = (*self.of_plugins, (observer, owner))
+
+    def _end(self, observer: WorldObserver) -> None:
+        if observer in self._all:
+            self.remove(observer)
 
     def remove_all(self) -> None:
         """Removes all observers, the last one first."""
@@ -165,12 +190,15 @@ class Observers:
 
     def _open(self, port: Output[Any] | Command[Any], opened: str, closed: str) -> None:
         for number, observer in enumerate(self._all):
+            outer, self.is_notifying = self.is_notifying, True
             try:
                 getattr(observer, opened)(port)
             except BaseException:
                 for notified in self._all[:number]:
                     self._call(notified, closed, port)
                 raise
+            finally:
+                self.is_notifying = outer
 
     # -- everything else: observers are contained ------------------------------------------
 
@@ -267,11 +295,14 @@ class Observers:
             self._call(observer, method, argument)
 
     def _call(self, observer: WorldObserver, method: str, *arguments: Any) -> None:
+        outer, self.is_notifying = self.is_notifying, True
         try:
             getattr(observer, method)(*arguments)
         except PLUGIN_FAULTS as error:
             what = f"observer {type(observer).__name__}: {method}"
-            self._faults.add((observer, method), what, error)
+            self._faults.add((id(observer), method), what, error)
+        finally:
+            self.is_notifying = outer
 
 
 def _overrides(observer: WorldObserver, method: str) -> bool:

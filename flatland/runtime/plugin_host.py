@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import logging
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import types
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, YamlError
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from flatland.entities.model import Model
     from flatland.geometry import Pose
     from flatland.plugin_api.plugin_world import PluginWorld
+    from flatland.plugin_api.ports import PortUser
     from flatland.runtime.faults import Faults
     from flatland.runtime.observer import Observers
     from flatland.runtime.plugin_costs import PluginCosts
@@ -40,7 +43,8 @@ class PluginHost:
         jobs: The updates and controllers of all plugins.
         contacts: Reports contacts to plugins.
         costs: Takes the wall time of all calls; None if it is not measured. Settable.
-        disabled: The plugins that were disabled because a hook raised repeatedly.
+        disabled: The plugins that were disabled because a function raised repeatedly. None of
+            their functions is called again, and `sweep` removes their jobs before the next step.
     """
 
     outside_state: ClassVar[dict[str, Callable[[], object]]] = {"costs": lambda: None}
@@ -69,10 +73,19 @@ class PluginHost:
         self._requests = requests
         self._faults = faults
         self._timeout = timeout
-        self.jobs = Jobs(world.physics.jobs, world.timekeeper, self._add_fault)
+        self.disabled: set[FlatlandPlugin] = set()
+        self._unswept: list[FlatlandPlugin] = []  # those of `disabled` that have jobs
+        self._starting: FlatlandPlugin | None = None  # whose `on_initialize` runs
+        self.jobs = Jobs(
+            world.physics.jobs,
+            world.timekeeper,
+            self.call,
+            faults,
+            self.disabled,
+            requests.hooks,
+        )
         self.contacts = ContactReporter(world.physics, self.call, self.jobs.order)
         self.costs: PluginCosts | None = None
-        self.disabled: set[FlatlandPlugin] = set()
 
     # -- start and end ---------------------------------------------------------------------
 
@@ -165,8 +178,10 @@ class PluginHost:
             plugin.ros = self._observers.plugin_ros(plugin)
             self._initialize(plugin, config)
             config.ensure_accessed_all()
+            self.jobs.add(plugin)
+            self.contacts.add_plugin(plugin)
         except PLUGIN_FAULTS as error:
-            self._release(plugin)
+            self._abandon(plugin)
             text = error.message if isinstance(error, PluginError) else str(error)
             if isinstance(error, SystemExit) or not (isinstance(error, FlatlandError) or text):
                 text = f"{type(error).__name__} {text}".strip()
@@ -176,23 +191,30 @@ class PluginHost:
                 raise PluginError(text, place=position, hint=error.hint) from error
             raise PluginError(text + entry.place.suffix, place=entry.place) from error
         except BaseException:
-            self._release(plugin)
+            self._abandon(plugin)
             raise
-        self.jobs.add(plugin)
-        self.contacts.add_plugin(plugin)
+
+    def _abandon(self, plugin: FlatlandPlugin) -> None:
+        """Removes all that a plugin that failed to start has declared."""
+        self._stop(plugin)
+        self._release(plugin)
+        self._forget([plugin])
 
     def _initialize(self, plugin: FlatlandPlugin, config: YamlReader) -> None:
+        outer, self._starting = self._starting, plugin
         try:
             with self._requests.plugin_code():
                 call_with_limit(self._timeout, lambda: plugin.on_initialize(config))
         except TimeLimitExceeded:
             raise PluginError(f"on_initialize did not return within {self._timeout:g} s") from None
+        finally:
+            self._starting = outer
 
     def shut_down(self, plugins: Sequence[FlatlandPlugin]) -> None:
         """Ends plugins, the last one first: no more hooks, `on_shutdown`, then their ports."""
+        interrupt: BaseException | None = None
         for plugin in plugins:
-            self.jobs.remove(plugin)
-            self.contacts.remove_plugin(plugin)
+            self._stop(plugin)
         for plugin in reversed(plugins):
             if isinstance(plugin, WorldPlugin) and plugin in self.world_plugins:
                 self.world_plugins.remove(plugin)
@@ -202,9 +224,23 @@ class PluginHost:
             except PLUGIN_FAULTS as error:
                 name = f"{describe(plugin)}: on_shutdown"
                 self._faults.add((plugin, "on_shutdown"), name, error)
+            except BaseException as error:
+                interrupt = interrupt or error  # The other plugins end, too.
             self._release(plugin)
+        self._forget(plugins)
+        if interrupt is not None:
+            raise interrupt
+
+    def _stop(self, plugin: FlatlandPlugin) -> None:
+        """Removes the jobs and the contact hooks of a plugin."""
+        self.jobs.remove(plugin)
+        self.contacts.remove_plugin(plugin)
+
+    def _forget(self, plugins: Sequence[FlatlandPlugin]) -> None:
+        """Removes the records of plugins that have ended."""
         self._faults.forget(set(plugins))
         self.disabled.difference_update(plugins)
+        self._unswept = [plugin for plugin in self._unswept if plugin in self.disabled]
 
     def _release(self, plugin: FlatlandPlugin) -> None:
         """Closes the ports and connections that a plugin left open."""
@@ -217,48 +253,90 @@ class PluginHost:
 
     # -- calls -----------------------------------------------------------------------------
 
+    def prepare_step(self, transforms_wanted: bool) -> bool:
+        """Prepares the next step; see `Jobs.refresh`."""
+        if self._unswept:
+            self._sweep()
+        if self.contacts.is_stale:
+            self.contacts.update()
+        return self.jobs.refresh(transforms_wanted)
+
+    def _sweep(self) -> None:
+        """Removes the jobs and contact hooks of the plugins that were disabled."""
+        while self._unswept:
+            self._stop(self._unswept.pop())
+
+    def find_owner(self, callback: object) -> PortUser | None:
+        """Returns who subscribes to an output, or adds an observer, in the current thread.
+
+        Args:
+            callback: The function that is subscribed; None without one.
+
+        Returns:
+            The plugin to which the function belongs, or which is being started; the host if other
+            code of a plugin runs; None for code outside of the world.
+        """
+        plugin = _plugin_of(callback)
+        if plugin is not None and plugin.world is self._world:
+            return plugin
+        is_outside = not self._requests.in_plugin or self._observers.is_notifying
+        return None if is_outside else self._starting or self
+
+    def call_at_end(self, function: Callable[[], None]) -> None:
+        """Does nothing: what unknown plugins use ends with the world."""
+
     def call_updates(self, callbacks: Sequence[int]) -> None:
         """Calls the functions of updates that are due; see `Jobs.call`."""
-        self.jobs.call(callbacks, self.call, one_by_one=self.costs is not None)
+        self.jobs.call(callbacks, one_by_one=self.costs is not None)
 
     def call(
         self,
         plugin: FlatlandPlugin,
         hook: str,
+        source: Hashable,
         function: Callable[..., object],
         *arguments: Any,
     ) -> None:
-        """Calls a function of a plugin, and takes what it raises.
+        """Calls a function of a plugin that is not disabled, and takes what it raises.
 
         Args:
             plugin: The plugin.
             hook: Name of the hook as part of which the function is called.
+            source: What identifies the function, see `Faults.add_of_plugin`.
             function: The function.
             *arguments: Its arguments.
         """
+        if plugin in self.disabled:
+            return
         if self.costs is not None:
             function = self.costs.timed(plugin, function)
         try:
             function(*arguments)
             if self._faults.counts:
-                self._faults.succeeded(plugin, hook)
+                self._faults.succeeded(plugin, source)
         except PLUGIN_FAULTS as error:
-            self._add_fault(plugin, hook, error)
+            if self._faults.add_of_plugin(plugin, hook, source, describe(plugin), error):
+                self.disabled.add(plugin)
+                self._unswept.append(plugin)
+                self.jobs.change()
 
     def model_moved(self, model: Model, previous: Mapping[str, Pose], keep_odometry: bool) -> None:
         """Calls `model_moved` of the plugins of a model; see `ModelPlugin.model_moved`."""
         self.jobs.settle()
+        hook = "model_moved"
         with self._requests.hooks():
             for plugin in (*model.plugins, *model.followers):
                 # Plugins that are disabled or have ended are omitted.
                 if plugin in self.jobs:
-                    self.call(plugin, "model_moved", plugin.model_moved, previous, keep_odometry)
+                    self.call(plugin, hook, hook, plugin.model_moved, previous, keep_odometry)
 
-    def _add_fault(self, plugin: FlatlandPlugin, hook: str, error: BaseException) -> None:
-        if self._faults.add_in_hook(plugin, hook, describe(plugin), error):
-            self.disabled.add(plugin)
-            self.contacts.remove_plugin(plugin)
-            if hook == "pre_solve":  # The core is locked during its physics step.
-                self.jobs.set_later(plugin, lambda: self.jobs.remove(plugin))
-            else:
-                self.jobs.remove(plugin)
+
+def _plugin_of(callback: object) -> FlatlandPlugin | None:
+    """Returns the plugin of which a function is a method, or in whose method it was created."""
+    while isinstance(callback, functools.partial):
+        callback = callback.func
+    owner = getattr(callback, "__self__", None)
+    if isinstance(callback, types.FunctionType) and "self" in callback.__code__.co_freevars:
+        cell = (callback.__closure__ or ())[callback.__code__.co_freevars.index("self")]
+        owner = cell.cell_contents
+    return owner if isinstance(owner, FlatlandPlugin) else None

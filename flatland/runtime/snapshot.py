@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 
@@ -12,11 +12,14 @@ from flatland.copying.kinds import UncopyableError
 from flatland.copying.record import SavedObjects
 from flatland.errors import WorldError
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, describe
+from flatland.plugin_api.ports import callback_name
 from flatland.runtime.appearance import appearance_of
 from flatland.timekeeper import NANOSECONDS
 from flatland.uncopied import uncopied
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from flatland.copying.kinds import Kind
     from flatland.entities.body import Body
     from flatland.entities.layer import Layer
@@ -24,12 +27,14 @@ if TYPE_CHECKING:
     from flatland.physics import PhysicsWorld
     from flatland.plugin_api.plugin import WorldPlugin
     from flatland.plugin_api.port_registry import PortRegistry
-    from flatland.plugin_api.ports import Output
+    from flatland.plugin_api.ports import Output, PortUser
     from flatland.runtime.layer_set import LayerSet
     from flatland.runtime.model_set import ModelSet
     from flatland.runtime.observer import Observers
     from flatland.runtime.plugin_host import PluginHost
     from flatland.timekeeper import Timekeeper
+
+T = TypeVar("T")
 
 _LOG = logging.getLogger("flatland")
 # Memory of a copy, measured with worlds of 3000 shared or other map edges, and 100 robots [bytes].
@@ -115,12 +120,23 @@ def size_of(physics: PhysicsWorld) -> int:
 
 
 class _Ports:
-    """The open ports of a world."""
+    """The open ports of a world, and what plugins have connected to their world."""
 
-    def __init__(self, ports: PortRegistry) -> None:
+    def __init__(self, ports: PortRegistry, observers: Observers) -> None:
         outputs, commands = ports.kept
         self.outputs = [*ports.outputs.values(), *outputs]
         self.commands = [c for same in ports.commands.values() for c in same] + commands
+        self.subscriptions = [entry for output in self.outputs for entry in output.of_plugins]
+        self.observers = observers.of_plugins
+
+    def resume(self, plugins: Collection[PortUser], observers: Observers) -> None:
+        """Connects plugins that have ended since, and are restored, to their world again."""
+        for output, token, callback, wants in self.subscriptions:
+            if token.owner in plugins:
+                output.resume(token, callback, wants=wants)
+        for observer, owner in self.observers:
+            if owner in plugins:
+                observers.resume(observer, owner)
 
 
 class Snapshots:
@@ -194,7 +210,7 @@ class Snapshots:
             objects,
             list(self._models.by_name.values()),
             list(self._host.world_plugins),
-            _Ports(self._ports),
+            _Ports(self._ports, self._observers),
         )
         self.taken += 1
         return snapshot
@@ -243,7 +259,7 @@ class Snapshots:
         watched = kept if observers.watch_appearance else ()
         appearances = [(model, appearance_of(model)) for model in models if model in watched]
         walls = self._walls()
-        ports, time_ns = _Ports(self._ports), self._timekeeper.sim_time_ns
+        ports, time_ns = _Ports(self._ports, self._observers), self._timekeeper.sim_time_ns
         self._physics.become_copy_of(snapshot._physics)
         error = snapshot._objects.write_back()
         self._host.jobs.change()  # Other outputs may be wanted than at that time.
@@ -284,6 +300,7 @@ class Snapshots:
             observers.command_opened(command)
         for plugin in revived_plugins:
             plugin.ros = observers.plugin_ros(plugin)
+        now.resume(revived_plugins, observers)
         for model in revived:
             observers.model_added(model)
 
@@ -323,11 +340,13 @@ class Snapshots:
             copier.add(part, other)
         try:
             copier.finish()
-            for output in self._ports.outputs.values():
-                _copy_subscriptions(output, copier)
-            copier.finish()
         except UncopyableError as error:
             raise self._located(error) from None
+        for output in self._ports.outputs.values():
+            _copy_subscriptions(output, copier)
+        for pair in self._observers.of_plugins:
+            made = _copied(pair, copier, f"the observer {type(pair[0]).__name__}")
+            clone._observers.resume(*made)
         clone._host.jobs.change()
 
     # -- errors ----------------------------------------------------------------------------
@@ -393,17 +412,42 @@ def _ended(plugin: FlatlandPlugin, attribute: str) -> WorldError:
 
 
 def _copy_subscriptions(output: Output[Any], copier: Copier) -> None:
-    """Copies the subscriptions of plugins, and which outputs they want."""
+    """Copies the subscriptions of plugins, and which outputs they want.
+
+    Raises:
+        WorldError: A subscription cannot be copied.
+    """
     copy = copier.find(output)
     subscribers = []
+    what = f'what wants the output "{output.topic}"'
+    inner = frozenset(_copied(tuple(output._inner_wanters), copier, what))
     wanters = {copier.find(who) for who in output._wanters} - {None}
     for token, callback in output._subscribers:
-        owner = getattr(callback, "__self__", None)
-        if owner is not None and copier.find(owner) is not None:
-            subscribers.append((token, copier(callback)))
-            if token in output._wanters:
-                wanters.add(token)
-    copy._subscribers, copy._wanters = tuple(subscribers), frozenset(wanters)
+        if token.owner is None and copier.find(getattr(callback, "__self__", None)) is None:
+            continue
+        what = f'the subscription {callback_name(callback)} of output "{output.topic}"'
+        if isinstance(token.owner, FlatlandPlugin):
+            what = f"{describe(token.owner)}: {what}"
+        made = _copied((token, callback), copier, what)
+        subscribers.append(made)
+        if token in output._wanters:
+            wanters.add(made[0])
+    copy._subscribers, copy._wanters = tuple(subscribers), inner | wanters
+    copy._inner_wanters = inner
+
+
+def _copied(original: T, copier: Copier, what: str) -> T:
+    """Returns the complete copy of what a plugin has connected to its world.
+
+    Raises:
+        WorldError: It cannot be copied; the text begins with its description.
+    """
+    try:
+        made: T = copier(original)
+        copier.finish()
+    except UncopyableError as error:
+        raise WorldError(f"{what} holds {error}, which cannot be copied; {_ADVICE}") from None
+    return made
 
 
 def _without(ports: list[Any], others: list[Any]) -> list[Any]:

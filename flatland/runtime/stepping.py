@@ -158,7 +158,7 @@ class Stepping:
             Whether this is possible, as long as nothing interrupts the jobs of the world: nothing
             observes the world, and no request waits.
         """
-        requests, host = self._requests, self._host
+        requests = self._requests
         if (
             requests.actions
             or requests.in_use
@@ -169,8 +169,11 @@ class Stepping:
             or self._world.closed
         ):
             return False
-        host.contacts.update()
-        host.jobs.refresh(transforms_wanted=False)
+        with requests.hooks():
+            if self._host.prepare_step(transforms_wanted=False):
+                # Which is each step from now on; the one that follows is prepared.
+                self._host.jobs.keep_repeated()
+                return False
         return self._physics.pre_solve is None
 
     def continue_unattended(self, n: int, result: RunResult | Exception) -> None:
@@ -238,10 +241,9 @@ class Stepping:
 
     def _steps(self, n: int, begun: RunResult | Exception | None) -> StepRun:
         world, host, timekeeper = self._world, self._host, self._timekeeper
-        if begun is None:
-            host.contacts.update()
-            host.jobs.refresh(self._observers.want_transforms)
         is_single = self._observers.watch_steps or self.change_log is not None
+        if begun is None and host.prepare_step(self._observers.want_transforms):
+            is_single = True
         start, step = timekeeper.sim_time_ns, timekeeper.step_size_ns
         run = Run(
             start,

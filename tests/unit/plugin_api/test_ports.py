@@ -122,6 +122,42 @@ def test_commands_reject_invalid_values_and_types():
         command.set("x")
 
 
+def test_a_command_is_counted_before_its_change_is_notified():
+    registry = PortRegistry(Recorder())
+    command = registry.open_command("go", float, 0.0)
+    seen = []
+    command.on_change = lambda: seen.append((command.state, command.value, command.received))
+    command.set(1.0)
+    command.value = 2.0
+    assert seen == [((1.0, 1), 1.0, 1), ((2.0, 1), 2.0, 1)]
+
+
+def test_concurrent_values_of_a_command_are_all_counted():
+    command = PortRegistry(Recorder()).open_command("go", float, 0.0)
+    command.accept = lambda value: True
+    states = []
+
+    def set_values():
+        for n in range(2000):
+            command.set(float(n))
+
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        threads = [threading.Thread(target=set_values) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        while any(thread.is_alive() for thread in threads):
+            states.append(command.state)
+        for thread in threads:
+            thread.join()
+    finally:
+        sys.setswitchinterval(interval)
+    assert command.received == 8000
+    assert command.state == (1999.0, 8000)
+    assert [count for _, count in states] == sorted(count for _, count in states)
+
+
 def test_an_observer_may_reject_a_port():
     class Refusal(Recorder):
         def output_opened(self, output):

@@ -57,7 +57,33 @@ def anchors(world: flatland.World) -> float:
     return math.dist(hook, eye)
 
 
+class Racing:
+    """A command that another thread sets after it was read once."""
+
+    def __init__(self, command: Any, value: bool) -> None:
+        self._command, self._values = command, [value]
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._command, name)
+        if self._values:
+            self._command.set(self._values.pop())
+        return found
+
+
 class TestTowing:
+    @pytest.mark.parametrize("last", [False, True])
+    def test_a_command_that_arrives_while_another_one_is_carried_out(
+        self, tow: Any, last: bool
+    ) -> None:
+        world = tow()
+        plugin, command = hitch(world), world.ports.commands["/hitch"][0]
+        command.set(last)
+        world.step()
+        command.set(not last)
+        plugin._command = Racing(command, last)
+        world.step(3)
+        assert (plugin.hitched is not None) == last
+
     @pytest.mark.parametrize("joint", ["hinge", "weld"])
     def test_trailer_follows(self, tow: Any, joint: str) -> None:
         """In a turn, a hinge bends and a weld keeps the angle."""

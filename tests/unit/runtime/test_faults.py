@@ -15,7 +15,7 @@ def take(faults: Faults, hook: str = "hook", plugin: object = "p", text: str = "
     try:
         raise RuntimeError(text)
     except RuntimeError as error:
-        return faults.add_in_hook(plugin, hook, "Plugin P", error)
+        return faults.add_of_plugin(plugin, hook, hook, "Plugin P", error)
 
 
 def test_an_unknown_policy_raises() -> None:

@@ -10,7 +10,9 @@ import threading
 import pytest
 
 import flatland
-from flatland import ModelPlugin, PluginError, WorldLockedError, WorldPlugin
+from flatland import FlatlandError, ModelPlugin, PluginError, WorldLockedError, WorldPlugin
+from flatland.loading.model_source import ModelSpec
+from flatland.runtime.observer import WorldObserver
 
 HOOKS = [
     "before_physics_step",
@@ -105,14 +107,87 @@ class Deleting(ModelPlugin):
 
 
 class FaultyCount(ModelPlugin):
-    """Fails when it accounts for updates without a call."""
+    """Fails when it accounts for updates without a call, unless it is asked not to."""
 
     def on_initialize(self, config):
+        self.calls = []
+        self.fails = True
         values = self.output("values", float)
-        self.on_update(lambda timekeeper: None, outputs=[values], skipped=self.fail)
+        drive = self.control(self.model.bodies[0].control_velocity())
+        drive.set_target(0.5, 0.0, 0.0)
+        self.on_update(self.update, outputs=[values], skipped=self.count)
 
-    def fail(self, count, stamp, poses):
-        raise RuntimeError("no count")
+    def update(self, timekeeper):
+        self.calls.append("update")
+
+    def count(self, count, stamp, poses):
+        self.calls.append("count")
+        if self.fails:
+            raise RuntimeError("no count")
+
+
+class TwoFaults(ModelPlugin):
+    """Has a function of each kind that fails, and others of the same hooks that succeed."""
+
+    source = ""
+
+    def on_initialize(self, config):
+        self.calls = 0
+        self.on_update(self.succeed, phase="before")
+        self.on_update(self.fail_if("update"))
+        self.on_update(self.succeed)
+        self.drive = self.control(self.model.bodies[0].control_velocity(holonomic=False))
+        self.target = 1e12 if self.source == "controller" else 0.0
+        self.drive.set_target(self.target, 0.0, 0.0)
+        self.on_update(self.request, phase="before")
+
+    def fail_if(self, source):
+        def call(timekeeper=None):
+            if self.source == source:
+                self.calls += 1
+                raise RuntimeError("always")
+
+        return call
+
+    def request(self, timekeeper):
+        self.set_before_step(self.fail_if("later"))
+        self.set_before_step(self.succeed)
+
+    def succeed(self, timekeeper=None):
+        pass
+
+
+class Uneven(ModelPlugin):
+    """Has a controller that fails in two of three steps."""
+
+    def on_initialize(self, config):
+        self.drive = self.control(self.model.bodies[0].control_velocity(holonomic=False))
+        self.on_update(self.set_target, phase="before")
+        self.steps = 0
+
+    def set_target(self, timekeeper):
+        self.steps += 1
+        self.drive.set_target(1e12 if self.steps % 3 else 1.0, 0.0, 0.0)
+
+
+class Prepared(ModelPlugin):
+    """Has updates that are prepared together, and a controller that fails in each step."""
+
+    prepared = 0
+
+    def on_initialize(self, config):
+        drive = self.control(self.model.bodies[0].control_velocity(holonomic=False))
+        drive.set_target(1e12, 0.0, 0.0)
+        for _ in range(2):
+            self.on_update(self.update, phase="before", prepare=Prepared.prepare)
+
+    @staticmethod
+    def prepare(plugins):
+        Prepared.prepared += 1
+        assert all(plugin not in plugin.world.plugin_host.disabled for plugin in plugins)
+
+    def update(self, timekeeper):
+        pass
 
 
 class Starting(ModelPlugin):
@@ -149,7 +224,7 @@ def _plugins(declare_plugins, caplog):
     """Declares the plugins of this module."""
     declare_plugins(
         *(Model, World, Exiting, Recovering, Witness, FaultyDrive, Deleting, FaultyCount),
-        *(Starting, Acting),
+        *(Starting, Acting, TwoFaults, Uneven, Prepared),
     )
     caplog.set_level(logging.ERROR, "flatland")
 
@@ -264,6 +339,69 @@ def test_a_plugin_that_fails_to_account_for_skipped_updates_is_reported(files, c
     assert "RuntimeError: no count" in caplog.text
 
 
+@pytest.mark.parametrize("change", ["delete", "step", "hash", "move", "restore"])
+def test_a_plugin_can_be_disabled_by_whatever_has_updates_counted(files, change):
+    world = crowded(files, bad("FaultyCount"))
+    plugin, snapshot = world.model("robot").plugin("bad"), world.snapshot()
+    bodies = world.physics.object_counts().bodies
+    for _ in range(2):
+        world.step(5)
+        world.state_hash()
+    world.step(5)
+    time = world.time
+    if change == "delete":
+        world.delete_model("robot")
+        assert robots(world) == []
+        assert world.physics.object_counts().bodies == bodies - 1
+    elif change == "move":
+        world.move_model("robot", (20, 0, 0))
+    elif change == "hash":
+        world.state_hash()
+    elif change == "restore":
+        world.restore(snapshot)
+        time = 0.0
+    world.output("/values") if change == "step" else None
+    world.step(3)
+    assert world.time == pytest.approx(time + 3 * 0.005)
+    assert plugin.calls.count("count") == (0 if change == "restore" else 3)
+    assert world.model("disc0")
+    if change in ("step", "hash", "move"):
+        assert world.plugin_host.disabled == {plugin}
+        body = world.model("robot").bodies[0]
+        body.set_velocity(0.25, 0.0, 0.0)
+        world.step()
+        assert body.velocity[0] != pytest.approx(0.5)  # Its controller was removed.
+
+
+def test_the_step_in_which_a_controller_disables_its_plugin_is_complete(files):
+    Prepared.prepared = 0
+    world = crowded(files, bad("Prepared"))
+    for n in range(6):
+        world.step()
+        assert world.time == pytest.approx((n + 1) * 0.005)
+    assert [plugin.name for plugin in world.plugin_host.disabled] == ["bad"]
+    assert Prepared.prepared == 2
+    witness = world.model("robot").plugin("witness")
+    assert witness.calls["before_physics_step"] == witness.calls["after_physics_step"] == 6
+
+
+@pytest.mark.parametrize("source", ["update", "later", "controller"])
+def test_each_function_of_a_plugin_has_a_count_of_its_own(files, monkeypatch, caplog, source):
+    monkeypatch.setattr(TwoFaults, "source", source)
+    world = alone(files, bad("TwoFaults"), plugin_errors="disable")
+    world.step(10)
+    assert [plugin.name for plugin in world.plugin_host.disabled] == ["bad"]
+    assert world.model("r").plugin("bad").calls == (0 if source == "controller" else 3)
+    assert caplog.text.count("the plugin is disabled") == 1
+
+
+def test_a_controller_that_succeeds_in_between_is_not_disabled(files):
+    world = alone(files, bad("Uneven"), plugin_errors="disable")
+    world.step(12)
+    assert not world.plugin_host.disabled
+    assert world.model("r").plugin("bad").steps == 12
+
+
 def test_a_hook_that_succeeds_in_between_is_not_disabled(files):
     world = crowded(files, bad("Recovering"))
     world.step(12)
@@ -321,6 +459,28 @@ def test_a_world_plugin_that_raises_in_on_initialize_fails_the_world(files):
     assert isinstance(caught.value.__cause__, ValueError)
 
 
+def test_a_model_is_deleted_completely_at_an_interrupt(files, monkeypatch):
+    monkeypatch.setattr(Model, "fault", KeyboardInterrupt)
+    world = crowded(files, bad("Model", "on_shutdown"))
+    model = world.model("robot")
+    witness, counts = model.plugin("witness"), world.physics.object_counts()
+    with pytest.raises(KeyboardInterrupt):
+        world.delete_model("robot")
+    assert witness.calls is None
+    assert robots(world) == []
+    assert world.physics.object_counts().bodies == counts.bodies - 1
+    world.step()
+
+
+def test_a_model_whose_body_was_destroyed_can_be_deleted(files):
+    world = crowded(files)
+    model = world.model("robot")
+    model.bodies[0].destroy()
+    world.delete_model("robot")
+    assert robots(world) == []
+    world.step()
+
+
 @pytest.mark.parametrize("kind", ["Model", "Exiting"])
 def test_a_plugin_that_raises_in_on_shutdown_is_removed(files, caplog, kind):
     world = crowded(files, bad(kind, "on_shutdown"))
@@ -360,6 +520,79 @@ def test_a_plugin_whose_on_initialize_does_not_return_is_interrupted(files, monk
     with pytest.raises(PluginError, match='plugin "bad" has ended and cannot open "late"'):
         started[0].output("late", float)
     assert world.ports.outputs == {}
+
+
+def start_everything(plugin):
+    """Uses all that a plugin can declare and create."""
+    world, body = plugin.world, plugin.model.bodies[0]
+    seen = plugin.seen = []
+
+    def record(*arguments):
+        seen.append(arguments)
+
+    plugin.output("own", float)
+    plugin.command("own_command", float)
+    plugin.control(body.control_velocity()).set_target(1.0, 0.0, 0.0)
+    plugin.on_update(record)
+    plugin.begin_contact = plugin.before_physics_step = record
+    plugin.set_before_step(record)
+    plugin.send_transform("a", "b", 0.0, 0.0, 0.0)
+    world.ports.find_output("/values").subscribe(record)
+    world.ports.find_output("/values").subscribe(lambda value: record(plugin, value))
+    world.ports.find_output("/values").want("me")
+    world.add_observer(Observing())
+    world.spawn_model("minimal.model.yaml", "trailer", pose=(9, 9, 0))
+    own = world.physics.create_body("dynamic", (8, 8, 0))
+    own.create_circle((0, 0), 0.1, density=1.0)
+    world.physics.create_weld_joint(own, world.model("disc0").bodies[0], (0, 0), (0, 0))
+    Starting.started.append(plugin)
+
+
+class Observing(WorldObserver):
+    """Counts steps."""
+
+    steps = 0
+
+    def step_finished(self):
+        Observing.steps += 1
+
+
+@pytest.mark.parametrize("how", ["raises", "job", "batch", "later_plugin"])
+def test_a_failed_start_leaves_nothing_behind(files, monkeypatch, how):
+    """The creation of a job fails if a body was destroyed."""
+    Starting.started, Observing.steps = [], 0
+
+    def act(plugin):
+        start_everything(plugin)
+        if how == "job":
+            body = plugin.world.physics.create_body("static", (0, 0, 0))
+            plugin.on_update(lambda timekeeper: None, bodies=[body])
+            body.destroy()
+        elif how != "later_plugin":
+            raise ValueError("no device")
+
+    monkeypatch.setattr(Starting, "act", act)
+    world = crowded(files, bad("FaultyCount"))
+    world.model("robot").plugin("bad").fails = False
+    world.step()
+    output = world.ports.find_output("/values")
+    before = world.state_hash(), world.physics.object_counts(), set(world.ports.outputs)
+    names, transforms = [model.name for model in world.models], set(world.transforms)
+    later = [bad("Model", "on_initialize").replace("name: bad", "name: other")]
+    robot(files, bad("Starting"), *(later if how == "later_plugin" else []), name="bad.yaml")
+    good = [ModelSpec("minimal.model.yaml", "good", pose=(5, 5, 0))] if how == "batch" else []
+    with pytest.raises(FlatlandError):
+        world.spawn_models([*good, ModelSpec("bad.yaml", "second")])
+    after = world.state_hash(), world.physics.object_counts(), set(world.ports.outputs)
+    assert after == before
+    assert [model.name for model in world.models] == names
+    assert not output.wanted
+    world.step(5)
+    output.emit(1.0)
+    assert len(Starting.started) == 1
+    assert Starting.started[0].seen == []
+    assert Observing.steps == 0
+    assert set(world.transforms) == transforms
 
 
 @pytest.mark.parametrize("timeout", [None, 10, 1e300, float("inf")])

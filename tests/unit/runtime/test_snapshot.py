@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import gc
+import queue
+import re
+import sys
 import types
 import weakref
 from collections.abc import Iterator
@@ -606,3 +610,205 @@ def test_a_clone_is_released(world: World) -> None:
     del clone
     gc.collect()
     assert reference() is None
+
+
+# -- what plugins connect to their world -------------------------------------------------------
+
+
+class Helper(flatland.WorldObserver):
+    """Counts values and steps on behalf of a plugin that does not refer to it."""
+
+    def __init__(self, plugin: Any) -> None:
+        self.plugin = plugin
+
+    def add(self, scan: object) -> None:
+        self.plugin.count("helper")
+
+    def step_finished(self) -> None:
+        self.plugin.count("observer")
+
+
+def count_for(plugin: Any, name: str, scan: object) -> None:
+    plugin.count(name)
+
+
+class Connecting(flatland.ModelPlugin):
+    """Connects all kinds of functions to its world: when it is loaded, or in its first step."""
+
+    late = False
+    extra: Any = None
+
+    def on_initialize(self, config: Any) -> None:
+        self.counts: dict[str, int] = {}
+        self.value = self.command("value", float)
+        self.on_update(self.update)
+        if not self.late:
+            self.connect()
+
+    def update(self, timekeeper: Any) -> None:
+        if self.late and not self.counts:
+            self.counts["late"] = 1
+            self.connect()
+
+    def connect(self) -> None:
+        def local(scan: object, plugin: Any = self) -> None:
+            plugin.count("local")
+
+        output = self.world.ports.find_output("/scan")
+        output.subscribe(self.method)
+        output.subscribe(lambda scan: self.count("lambda"))
+        output.subscribe(functools.partial(self.named, "partial"))
+        output.subscribe(functools.partial(count_for, self, "function"))
+        output.subscribe(local, wants=False)
+        output.subscribe(Helper(self).add)
+        self.world.add_observer(Helper(self))  # type: ignore[attr-defined]
+        self.value.on_change = lambda: self.set_before_step(lambda: self.count("command"))
+        self.set_before_step(lambda: self.count("later"))
+        if self.extra is not None:
+            output.subscribe(self.extra())
+
+    def method(self, scan: object) -> None:
+        self.count("method")
+
+    def named(self, name: str, scan: object) -> None:
+        self.count(name)
+
+    def count(self, name: str) -> None:
+        self.counts[name] = self.counts.get(name, 0) + 1
+
+    def state(self) -> object:
+        return dict(self.counts)
+
+
+class Wanting(flatland.ModelPlugin):
+    """Has a scan computed, and keeps the last one."""
+
+    def on_initialize(self, config: Any) -> None:
+        self.world.ports.find_output("/scan").want("any name")
+        self.on_update(self.read)
+        self.last = 0
+
+    def read(self, timekeeper: Any) -> None:
+        scan = self.world.ports.find_output("/scan").latest
+        self.last = -1 if scan is None else scan.stamp
+
+    def state(self) -> object:
+        return self.last
+
+
+CONNECTED = """
+bodies: [{{name: base, footprints: [{{type: circle, radius: 0.2, density: 1}}]}}]
+plugins:
+  - {{name: laser, type: Laser, body: base, range: 5, angle: {{min: -1, max: 1, increment: 0.5}}}}
+  - {{name: p, type: "test::{}"}}
+"""
+
+
+@pytest.fixture
+def connected(files: Any, declare_plugins: Any) -> Any:
+    """Loads a robot with a laser and a plugin that uses its scans."""
+    declare_plugins(Connecting, Wanting)
+
+    def load(kind: str = "Connecting") -> World:
+        world: World = files.load_model(CONNECTED.format(kind))
+        return world
+
+    return load
+
+
+def counts_of(world: World) -> Any:
+    return world.model("robot").plugin("p").counts
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_a_clone_has_all_that_plugins_have_connected(
+    connected: Any, monkeypatch: pytest.MonkeyPatch, late: bool
+) -> None:
+    monkeypatch.setattr(Connecting, "late", late)
+    world = connected()
+    world.step(3 if late else 0)
+    with world.clone() as clone, clone.clone() as second:
+        assert counts_of(clone) is not counts_of(world)
+        for each in (world, clone, second):
+            each.command("/value").set(1.0)
+            each.step(10)
+        names = ["method", "lambda", "partial", "function", "local", "helper"]
+        assert len({counts_of(world)[name] for name in names}) == 1
+        assert counts_of(world)["observer"] >= 10
+        assert counts_of(world)["command"] == counts_of(world)["later"] == 1
+        assert counts_of(clone) == counts_of(second) == counts_of(world)
+        assert clone.state_hash() == second.state_hash() == world.state_hash()
+
+
+def test_a_clone_wants_what_its_plugins_want(connected: Any) -> None:
+    world = connected("Wanting")
+    world.step(2)
+    with world.clone() as clone:
+        for each in (world, clone):
+            each.step(5)
+        assert world.model("robot").plugin("p").last > 0
+        assert clone.state_hash() == world.state_hash()
+
+
+def test_functions_from_outside_are_not_cloned(connected: Any) -> None:
+    world = connected()
+    scans, plugin = types.SimpleNamespace(n=0, lock=iter([])), world.model("robot").plugin("p")
+
+    class Watch(flatland.WorldObserver):
+        def step_finished(self) -> None:
+            scans.n += 1
+
+        def output_opened(self, output: Any) -> None:
+            output.subscribe(lambda value: setattr(scans, "n", scans.n + 1))
+
+    world.output("/scan").subscribe(lambda scan: setattr(scans, "n", scans.n + len(plugin.counts)))
+    world.add_observer(Watch())
+    world.spawn_model(CONNECTED.format("Wanting"), "two", "two", pose=(3, 3, 0))
+    with world.clone() as clone:
+        clone.step(5)
+        assert scans.n == 0
+
+
+def uncopyable() -> Any:
+    numbers = (number for number in range(3))
+    return lambda scan: next(numbers)
+
+
+@pytest.mark.parametrize(
+    ("extra", "name", "held"),
+    [
+        (uncopyable, "uncopyable.<locals>.<lambda>", "generator"),
+        (lambda: functools.partial(print, file=sys.stdout), "print", "EncodedFile|TextIOWrapper"),
+        (lambda: queue.Queue().put, "Queue.put", "Lock|Queue|lock|Condition"),
+    ],
+)
+def test_a_subscription_that_cannot_be_cloned_is_named(
+    connected: Any, monkeypatch: pytest.MonkeyPatch, extra: Any, name: str, held: str
+) -> None:
+    monkeypatch.setattr(Connecting, "extra", staticmethod(extra))
+    world = connected()
+    text = rf'model "robot": the subscription {re.escape(name)} of output "/scan" holds .*({held})'
+    with pytest.raises(WorldError, match=text):
+        world.clone()
+    world.step(3)
+    assert counts_of(world)["lambda"] > 0
+
+
+def test_what_a_plugin_has_connected_ends_and_returns_with_it(connected: Any) -> None:
+    world = connected()
+    world.spawn_model(CONNECTED.format("Connecting"), "two", "two", pose=(3, 3, 0))
+    plugin = world.model("two").plugin("p")
+    world.step(2)
+    snapshot = world.snapshot()
+    world.step(10)
+    expected = dict(plugin.counts)
+    world.delete_model("two")
+    world.step(10)
+    assert plugin.counts == expected
+    assert len(world.ports.find_output("/scan").of_plugins) == 6
+    world.restore(snapshot)
+    assert len(world.ports.find_output("/scan").of_plugins) == 12
+    world.step(10)
+    assert plugin.counts == expected
+    world.reset()
+    assert len(world.ports.find_output("/scan").of_plugins) == 6
