@@ -100,6 +100,23 @@ class World:
             StaleHandleError: The world is closed.
             WorldLockedError: The world is stepping.
         """
+    @property
+    def newest_objects(self) -> tuple[int, int]:
+        """Ids of the newest body and the newest joint, 0 for none; for `objects_since`."""
+    def objects_since(self, newest: tuple[int, int]) -> tuple[list[int], list[int]]:
+        """Returns the bodies and joints that were created since, by id.
+
+        Args:
+            newest: Earlier value of `newest_objects`.
+
+        Returns:
+            Ids of bodies and of joints, the newest first. If an object in `newest` was destroyed
+            meanwhile, there are none of its kind, since it is not known which ones are newer.
+
+        Raises:
+            StaleHandleError: The world is closed.
+            WorldLockedError: The world is stepping.
+        """
     def create_body(
         self,
         body_type: str,

@@ -47,7 +47,12 @@ GENERICS = {
 }
 ABC = ("Callable", "Iterable", "Mapping", "Sequence", "Set")
 OWN = [name for name in physics.__all__ if name not in vars(_core)]
-SKIPPED = frozenset(["__module__", "__doc__", "__qualname__", "__new__", "_pybind11_conduit_v1_"])
+SKIPPED = frozenset(
+    [
+        *("__module__", "__doc__", "__qualname__", "__new__", "_pybind11_conduit_v1_"),
+        *("__reduce_ex__", "copy_advice"),  # set by `flatland.uncopied`
+    ]
+)
 
 
 class TypeWriter(ast.NodeTransformer):

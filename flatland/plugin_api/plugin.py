@@ -137,7 +137,7 @@ class FlatlandPlugin:
         self._sent.clear()
         self._declared.clear()
 
-    def call_at_end(self, function: Callable[[], None]) -> None:
+    def _call_at_end(self, function: Callable[[], None]) -> None:
         """Calls a function after `on_shutdown`, or after a failed start."""
         self._endings.append(function)
 

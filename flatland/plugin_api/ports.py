@@ -26,7 +26,7 @@ OwnedSubscription = tuple["Output[Any]", "Token", Callable[[Any], None], bool]
 class PortUser(Protocol):
     """A plugin, or the plugins of a world, by which an output is used."""
 
-    def call_at_end(self, function: Callable[[], None]) -> None:
+    def _call_at_end(self, function: Callable[[], None]) -> None:
         """Calls a function when the user ends."""
 
 
@@ -134,7 +134,7 @@ class Output(Generic[T]):
         """Marks the output as wanted on behalf of `who`; safe from any thread."""
         owner = None if self._find_owner is None else self._find_owner(None)
         if owner is not None:
-            owner.call_at_end(lambda: self.unwant(who))
+            owner._call_at_end(lambda: self.unwant(who))
         with self._lock:
             if owner is not None:
                 self._inner_wanters |= {who}
@@ -198,7 +198,7 @@ class Output(Generic[T]):
             if wants:
                 self._set_wanters(self._wanters | {token})
         if owner is not None:
-            owner.call_at_end(lambda: self.unsubscribe(token))
+            owner._call_at_end(lambda: self.unsubscribe(token))
         return lambda: self.unsubscribe(token)
 
     def unsubscribe(self, token: Token) -> None:

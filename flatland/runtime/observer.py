@@ -144,7 +144,7 @@ class Observers:
         """Adds an observer that ends with a plugin."""
         self.add(observer)
         self.of_plugins = (*self.of_plugins, (observer, owner))
-        owner.call_at_end(lambda: self._end(observer))
+        owner._call_at_end(lambda: self._end(observer))
 
     def resume(self, observer: WorldObserver, owner: PortUser) -> None:
         """Adds an observer again that ended with its plugin."""

@@ -282,7 +282,7 @@ class PluginHost:
         is_outside = not self._requests.in_plugin or self._observers.is_notifying
         return None if is_outside else self._starting or self
 
-    def call_at_end(self, function: Callable[[], None]) -> None:
+    def _call_at_end(self, function: Callable[[], None]) -> None:
         """Does nothing: what unknown plugins use ends with the world."""
 
     def call_updates(self, callbacks: Sequence[int]) -> None:

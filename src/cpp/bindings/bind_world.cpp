@@ -120,8 +120,8 @@ Args:
     newest: Earlier value of `newest_objects`.
 
 Returns:
-    Ids of bodies and of joints, the newest first. There are none of a kind whose object in `newest`
-    was destroyed meanwhile, since it is not known which ones are newer.
+    Ids of bodies and of joints, the newest first. If an object in `newest` was destroyed
+    meanwhile, there are none of its kind, since it is not known which ones are newer.
 
 Raises:
     StaleHandleError: The world is closed.

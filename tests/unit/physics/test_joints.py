@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -133,6 +134,36 @@ def test_a_weld_with_a_spring_oscillates_at_its_frequency(world: PhysicsWorld) -
         angles.append(rotor.pose[2])
     crossings = np.nonzero(np.diff(np.sign(angles)))[0]
     assert crossings[:2] * 0.001 == pytest.approx([0.25, 0.75], abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda rotor: rotor.scale_shapes(0.5),
+        lambda rotor: setattr(rotor.fixtures[0], "density", 30.0),
+        lambda rotor: rotor.create_circle((0, 0), 1.0, density=1.0),
+    ],
+)
+def test_a_spring_keeps_its_frequency_when_the_mass_of_a_body_changes(
+    world: PhysicsWorld, change: Callable[[PhysicsBody], object]
+) -> None:
+    def angles(is_changed_before: bool) -> list[float]:
+        wall = world.create_body("static", (0, 0, 0))
+        rotor = world.create_body("dynamic", (0, 0, 0.2))
+        rotor.create_circle((0, 0), 0.5, density=3, mask_bits=0)
+        if is_changed_before:
+            change(rotor)
+        world.create_weld_joint(wall, rotor, (0, 0), (0, 0), frequency=1.0, damping=0.1)
+        if not is_changed_before:
+            change(rotor)
+        found = []
+        for _ in range(200):
+            world.step(0.005, 20, 20)
+            found.append(rotor.pose[2])
+        rotor.destroy()
+        return found
+
+    assert angles(False) == angles(True)
 
 
 def test_a_damped_weld_comes_to_rest(world: PhysicsWorld) -> None:

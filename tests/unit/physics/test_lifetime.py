@@ -252,3 +252,24 @@ def test_a_world_without_references_is_freed() -> None:
     reference = weakref.ref(world)
     del world
     assert reference() is None, "without help of the garbage collector"
+
+
+def test_objects_that_were_created_since_are_listed() -> None:
+    world = PhysicsWorld()
+    assert (world.newest_objects, world.objects_since((0, 0))) == ((0, 0), ([], []))
+    first, second = (world.create_body("dynamic", (0, 0, 0)) for _ in range(2))
+    world.create_weld_joint(first, second, (0, 0), (0, 0))
+    newest = world.newest_objects
+    assert world.objects_since(newest) == ([], [])
+    third, fourth = (world.create_body("dynamic", (0, 0, 0)) for _ in range(2))
+    joint = world.create_weld_joint(first, third, (0, 0), (0, 0))
+    assert world.objects_since(newest) == ([fourth.id, third.id], [joint.id])
+    third.destroy()
+    assert world.objects_since(newest) == ([fourth.id], [])
+    second.destroy()  # It is not known any more what came after this body and its joint.
+    assert world.objects_since(newest) == ([], [])
+    world.close()
+    with pytest.raises(StaleHandleError):
+        _ = world.newest_objects
+    with pytest.raises(StaleHandleError):
+        world.objects_since((0, 0))

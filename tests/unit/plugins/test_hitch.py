@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from racing_commands import RacingCommand
 
 import flatland
 from flatland.recording import Replay
@@ -57,19 +58,6 @@ def anchors(world: flatland.World) -> float:
     return math.dist(hook, eye)
 
 
-class Racing:
-    """A command that another thread sets after it was read once."""
-
-    def __init__(self, command: Any, value: bool) -> None:
-        self._command, self._values = command, [value]
-
-    def __getattr__(self, name: str) -> Any:
-        found = getattr(self._command, name)
-        if self._values:
-            self._command.set(self._values.pop())
-        return found
-
-
 class TestTowing:
     @pytest.mark.parametrize("last", [False, True])
     def test_a_command_that_arrives_while_another_one_is_carried_out(
@@ -80,7 +68,7 @@ class TestTowing:
         command.set(last)
         world.step()
         command.set(not last)
-        plugin._command = Racing(command, last)
+        plugin._command = RacingCommand(command, last)
         world.step(3)
         assert (plugin.hitched is not None) == last
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from racing_commands import RacingCommand
 
 import flatland
 
@@ -204,6 +205,17 @@ class TestModes:
         world.command("/go").set(True)
         world.step(50)
         assert pose(world)[0] == pytest.approx(1.5, abs=1e-6)
+
+
+@pytest.mark.parametrize("first", [False, True])
+def test_a_command_that_arrives_while_another_one_is_carried_out(follow: Any, first: bool) -> None:
+    world = follow("waypoints: [[1, 0]], start_topic: go")
+    command = world.ports.commands["/go"][0]
+    command.set(first)
+    plugin(world)._start_command = RacingCommand(command, not first)
+    world.step(3)
+    _, is_started, starts = plugin(world).state()
+    assert (is_started, starts) == (not first, 1 if first else 2)
 
 
 def test_equal_waypoints_do_not_hang(follow: Any) -> None:
