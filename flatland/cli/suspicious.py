@@ -7,11 +7,13 @@ from typing import Final
 
 import numpy as np
 
+from flatland.config.collecting_reader import ErrorCollector
 from flatland.config.inputs import Inputs, Params
 from flatland.config.reader import read_yaml
 from flatland.entities.model import Model
 from flatland.errors import Place
 from flatland.geometry import Bounds, DoubleArray, bounds_of, transform_points
+from flatland.maps.occupancy_grid import ImageGrid
 from flatland.plugin_api.plugin import FlatlandPlugin, describe
 from flatland.plugins._range_sensor import RangeSensor
 from flatland.scene.description import describe_body
@@ -38,6 +40,27 @@ def warn_about_world(world: World, params: Params) -> None:
     _warn_about_topics(world)
     _warn_about_frames(world)
     _warn_about_models_outside(world, params)
+    _warn_about_published_maps(world, params)
+
+
+# -- maps ----------------------------------------------------------------------------------
+
+
+def _warn_about_published_maps(world: World, params: Params) -> None:
+    """Logs a warning for each key of a map file that is used only if the map is published."""
+    inputs = Inputs(params, logs=False)
+    for layer in world.layers:
+        if not _is_image(layer.map_path, inputs):
+            continue
+        collector = ErrorCollector()
+        reader = collector.read(layer.map_path, inputs)
+        ImageGrid(reader.with_location(f'layer "{layer.name}"'))
+        for error in collector.errors:
+            place = error.place or Place(layer.map_path)
+            text = error.message.removesuffix(place.suffix)
+            hint = error.hint or "the walls do not depend on it"
+            extra = {"place": place, "hint": hint}
+            _LOG.warning("%s, so that the map cannot be published", text, extra=extra)
 
 
 # -- topics and frames ---------------------------------------------------------------------

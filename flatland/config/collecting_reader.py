@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Self, TypeVar, Unpack
@@ -132,6 +133,10 @@ class ErrorCollector:
         self._unusable[id(node)] = node
 
 
+def _g(number: float) -> str:
+    return f"{number:g}"
+
+
 _Spot = tuple[Place, str, str, Key]
 """Place, location and name of a reader, and a key."""
 
@@ -189,7 +194,9 @@ class CollectingReader(YamlReader):
         """Reads an entry; see `YamlReader.get`."""
 
         def read(reader: Any) -> Any:
-            return reader.get(key, kind, default, **limits)
+            value = reader.get(key, kind, default, **limits)
+            self._warn_about_degrees(key, kind, value)
+            return value
 
         return self._read(key, kind, default, limits, read)
 
@@ -197,7 +204,9 @@ class CollectingReader(YamlReader):
         """Reads an entry as a list; see `YamlReader.get_list`."""
 
         def read(reader: Any) -> Any:
-            return reader.get_list(key, kind, default, **options)
+            values = reader.get_list(key, kind, default, **options)
+            self._warn_about_degrees(key, kind, values)
+            return values
 
         size = options.get("size") or options.get("min_size", 0)
         limits = {key: options[key] for key in ("minimum", "maximum") if key in options}
@@ -223,6 +232,13 @@ class CollectingReader(YamlReader):
         if size is None:
             return self._stand_in(kind, limits)
         return [self._stand_in(kind, limits) for _ in range(size)]
+
+    def _warn_about_degrees(self, key: Key, kind: Kind, value: Any) -> None:
+        """Logs a warning if an angle of a value is probably in degrees."""
+        hint = hints.degrees_of(value, kind)
+        if hint and self._find_quietly(key) is not None:
+            shown = f"{value:g}" if isinstance(value, float) else f"[{', '.join(map(_g, value))}]"
+            self.warn(key, f"{shown}, with an angle of more than a full turn", hint)
 
     def _is_invalid(self, key: Key) -> bool:
         """Returns whether errors about an entry are known or follow from others."""
@@ -265,7 +281,7 @@ class CollectingReader(YamlReader):
             number = min(number, maximum)
         if kind in ("int", int):
             return int(number)
-        if kind in ("float", float):
+        if kind in ("float", float, "angle"):
             return number
         return (number,) * TUPLE_SIZES.get(str(kind), 2)
 
@@ -331,10 +347,12 @@ class CollectingReader(YamlReader):
         node = self._find_quietly(key) or self._node
         return FollowUpError(error.message) if is_follow_up else _about(error, node)
 
-    def warn(self, key: Key, what: str) -> None:
+    def warn(self, key: Key, what: str, hint: str = "") -> None:
         """Logs a warning about the value of an entry."""
-        place = self._reader(self._find_quietly(key) or self._node, key).place
-        _LOG.warning('"%s" is %s', key, what, extra={"place": place})
+        entry = self._reader(self._find_quietly(key) or self._node, key)
+        # Of an item, the name of the list.
+        name = entry.name if isinstance(key, str) else re.findall(r'"\w*"', entry.location)[-1]
+        _LOG.warning("%s is %s", name, what, extra={"place": entry.place, "hint": hint})
 
     def report(self, error: FlatlandError) -> None:
         """Adds an error; within `attempt`, raises the error."""

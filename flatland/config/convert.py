@@ -11,7 +11,7 @@ from flatland.config.node import ListNode, MapNode, Node, ScalarNode
 
 BoolKind = Literal["bool"] | type[bool]
 IntKind = Literal["int"] | type[int]
-FloatKind = Literal["float"] | type[float]
+FloatKind = Literal["float", "angle"] | type[float]
 StringKind = Literal["string"] | type[str]
 Kind = BoolKind | IntKind | FloatKind | StringKind | Literal["vector", "pose", "color"]
 NodeKind = Literal["any", "map", "list"]
@@ -208,7 +208,7 @@ def _scalar(convert: Callable[[str], object]) -> Callable[[Node], object]:
 
 CONVERSIONS: Final[dict[object, tuple[str, Callable[[Node], Any]]]] = {
     **dict.fromkeys(("string", str), ("string", _scalar(to_string))),
-    **dict.fromkeys(("float", float), ("float", _scalar(to_float))),
+    **dict.fromkeys(("float", float, "angle"), ("float", _scalar(to_float))),
     **dict.fromkeys(("int", int), ("int", _scalar(to_int))),
     **dict.fromkeys(("bool", bool), ("bool", _scalar(to_bool))),
     "vector": ("vector", to_vector),

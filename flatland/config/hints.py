@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Callable, Iterable
@@ -69,6 +70,31 @@ _VALUES = {
     "sphere": "circle",
     "cylinder": "circle",
 }
+
+
+_NAN = "nan is the result of an invalid computation, such as 0/0"
+_NOT_A_NUMBER = re.compile(r"[-+]?(\.?nan(\(.*\))?|1\.#(ind|qnan|snan))\d*", re.IGNORECASE)
+_INFINITY = re.compile(r"[-+]?(\.?inf(inity)?|1\.#inf)\d*", re.IGNORECASE)
+_WITH_UNIT = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)) *([a-zA-Zµ%][a-zA-Zµ/%²^\d]*)")
+_SI = ("m", "meter", "meters", "s", "sec", "Hz", "hz", "kg", "N", "Nm", "rad", "rad/s", "m/s", "px")
+_SI += ("rad/s²", "rad/s^2", "m/s²", "m/s^2", "m/s2", "kg/m²", "kg/m^2", "kg/m2")
+_UNITS: dict[str, float] = dict.fromkeys(_SI, 1)
+_UNITS |= {"cm": 0.01, "mm": 0.001, "km": 1000, "cm/s": 0.01, "mm/s": 0.001, "km/h": 1 / 3.6}
+_UNITS |= {"ms": 0.001, "µs": 1e-6, "us": 1e-6, "min": 60, "kHz": 1000, "g": 0.001, "%": 0.01}
+_UNITS |= {"rpm": math.tau / 60}
+_ARITHMETIC = re.compile(
+    r"(?:\d++\.?+\d*+(?:e[-+]?\d++)?+|\.\d++|(?:math\.)?(?:pi|sqrt|sin|cos|tan|rad)|[-+*/(),\s])++"
+)
+_XACRO = re.compile(r"\$\{(.*)\}|\$\((?:eval|arg) (.*)\)")
+
+MAX_TURNS = 1.02
+"""Full turns above which an angle is suspicious; it may be rounded up."""
+_ANGLE_STEP = math.pi / 12  # multiples of which are used in files
+_ANGLE_ERROR = 0.005  # of a multiple that is written with two decimals
+_NAN_ANGLE = (
+    "map_saver writes nan if the orientation of the map is not a valid quaternion; the angle of a "
+    "map is usually 0"
+)
 
 
 def did_you_mean(word: str, candidates: Iterable[str], kind: str = "") -> str:
@@ -165,6 +191,49 @@ def not_a_map(location: str) -> str:
     return _ITEMS.get(location.rpartition(" ")[2].strip('"'), "")
 
 
+def degrees(angle: float) -> str:
+    """Returns a hint for an angle [rad] that is probably in degrees, empty for any other."""
+    if not math.isfinite(angle) or abs(angle) <= MAX_TURNS * math.tau:
+        return ""
+    steps = angle / _ANGLE_STEP
+    is_multiple = abs(steps - round(steps)) * _ANGLE_STEP < _ANGLE_ERROR
+    if is_multiple and not float(angle).is_integer():
+        return ""
+    return (
+        f"angles are in radians; {angle:g} degrees are {math.radians(angle):.6g}, or "
+        f"$eval math.rad({angle:g})"
+    )
+
+
+def degrees_of(value: object, kind: object) -> str:
+    """Returns a hint for the first angle of a value that is probably in degrees.
+
+    Args:
+        value: An angle, a pose, or a list of either.
+        kind: Kind of the value, see `YamlReader.get`; others than angles and poses have no hint.
+    """
+    if kind not in ("angle", "pose"):
+        return ""
+    values = value if isinstance(value, list) else [value]
+    if kind == "pose":
+        values = [pose[2] for pose in values if isinstance(pose, tuple)]
+    angles = (angle for angle in values if isinstance(angle, float))
+    return next(filter(None, map(degrees, angles)), "")
+
+
+def unmet_limit(value: object, kind: object, location: str) -> str:
+    """Returns a hint for a value that is out of range or not finite.
+
+    Args:
+        value: A number, or a tuple or list of numbers.
+        kind: Kind of the value, see `YamlReader.get`.
+        location: Location of the value in error messages, with its name.
+    """
+    if isinstance(value, tuple) and math.isnan(value[-1]) and _is_map_origin(location):
+        return _NAN_ANGLE
+    return degrees_of(value, kind)
+
+
 def choice(value: str, choices: Iterable[str]) -> str:
     """Returns a hint for a value that is not one of some words."""
     meant = _VALUES.get(value.lower(), "")
@@ -172,29 +241,66 @@ def choice(value: str, choices: Iterable[str]) -> str:
     return f'did you mean "{meant}"?' if meant in choices else did_you_mean(value, choices)
 
 
-def conversion(text: str, kind: str) -> str:
+def conversion(text: str, kind: str, location: str = "") -> str:
     """Returns a hint for a scalar that cannot be converted.
 
     Args:
         text: The scalar.
         kind: Name of the kind of value in the error message.
+        location: Location of the scalar in error messages.
     """
-    if kind in ("float", "int"):
-        if re.fullmatch(r"[-+]?\d+,\d+", text):
-            return f"decimals are written with a point: {text.replace(',', '.')}"
-        if re.fullmatch(r"[-+]?[\d.]+ *(deg|degrees|°)", text):
-            return f"angles are in radians: $eval math.rad({re.split('[ d°]', text)[0]})"
-        if match := re.fullmatch(r"([-+]?[\d.]+) *[a-zA-Z/%²]+", text):
-            return f"numbers are written without a unit: {match[1]}"
-        if kind == "int" and re.fullmatch(r"[-+]?\d+\.\d*", text):
-            return f"a whole number without a point is required, such as {text.split('.')[0]}"
-        if re.search(r"[-+*/]|pi", text):
-            return f"expressions start with $eval: $eval {text}"
+    if kind in ("float", "int") and len(text) <= _MAX_SHOWN:
+        if _NOT_A_NUMBER.fullmatch(text):
+            return _NAN_ANGLE if _is_map_origin(location) else _NAN
+        return _number(text, kind)
     if kind == "bool":
         return "true or false"
     if kind == "vector":
         return "two numbers are written as [x, y]"
     return ""
+
+
+def _is_map_origin(location: str) -> bool:
+    return location.startswith('layer "') and location.endswith('"origin"')
+
+
+def _number(text: str, kind: str) -> str:
+    """Returns a hint for a text that should be a number."""
+    if re.fullmatch(r"[-+]?\d+,\d+", text):
+        return f"decimals are written with a point: {text.replace(',', '.')}"
+    if _INFINITY.fullmatch(text):
+        return f"infinity is written {'-' if text.startswith('-') else ''}.inf"
+    if match := re.fullmatch(r"([-+]?[\d.]+) *(?:deg|degrees?|°)(/s)?", text):
+        what = "angular velocities are in rad/s" if match[2] else "angles are in radians"
+        return f"{what}: $eval math.rad({match[1]})"
+    if match := _WITH_UNIT.fullmatch(text):
+        factor = _UNITS.get(match[2])
+        number = match[1] if factor in (None, 1) else f"{float(match[1]) * factor:.6g}"
+        other = "" if factor is not None else ", but in SI units"
+        return f"numbers are written without a unit{other or f': {number}'}"
+    if kind == "int" and re.fullmatch(r"[-+]?\d+\.\d*", text):
+        return f"a whole number without a point is required, such as {text.split('.')[0]}"
+    if match := _XACRO.fullmatch(text):
+        inner = match[1] or match[2]
+        expression = _expression(inner)
+        meant = f": {expression}" if expression else ', such as $eval param("/name", 1)'
+        return f"expressions of xacro and of launch files are not evaluated here; use $eval{meant}"
+    expression = _expression(text)
+    return f"expressions start with $eval: {expression}" if expression else ""
+
+
+def _expression(text: str) -> str:
+    """Returns the expression of Lua for a text, empty if the text is not arithmetic."""
+    from flatland.config.lua import EvalError, evaluate  # late, since only mistakes need it
+
+    if not _ARITHMETIC.fullmatch(text):
+        return ""
+    code = re.sub(r"(?<![\w.])(pi|sqrt|sin|cos|tan|rad)", r"math.\1", text.strip())
+    try:
+        evaluate(code, lambda _: None)
+    except EvalError:
+        return ""
+    return f"$eval {code}"
 
 
 def is_yaml_name(file: Path) -> bool:

@@ -365,8 +365,9 @@ class YamlReader:
 
         Args:
             key: Key of a map or index of a list.
-            kind: `string`, `float`, `int`, `bool` (or the Python type); `vector` for (x, y),
-                `pose` for (x, y, theta), `color` for (r, g, b, a), all of floats.
+            kind: `string`, `float`, `int`, `bool` (or the Python type); `angle` for a float in
+                radians; `vector` for (x, y), `pose` for (x, y, theta), `color` for (r, g, b, a),
+                all of floats. `flatland check` warns about angles that are probably in degrees.
             default: Returned unchecked if the entry is missing or empty; if omitted, the entry is
                 required.
             **limits: Requirements of a number, or of each number of a vector, pose or colour:
@@ -379,7 +380,7 @@ class YamlReader:
         if default is not REQUIRED and self._is_missing(key):
             return default
         entry = self._open(key)
-        return entry._checked(entry._convert(kind), limits)
+        return entry._checked(entry._convert(kind), limits, kind)
 
     @overload
     def value(self, kind: BoolKind) -> bool: ...
@@ -452,16 +453,17 @@ class YamlReader:
             return default
         entry = self.subnode(key, "list")
         entry._check_size(min_size, max_size, size)
-        return entry._checked([item._convert(kind) for item in entry.items()], limits)
+        return entry._checked([item._convert(kind) for item in entry.items()], limits, kind)
 
     # -- collection of errors, see `flatland.config.collecting_reader` -------------------------
 
-    def warn(self, key: Key, what: str) -> None:
+    def warn(self, key: Key, what: str, hint: str = "") -> None:
         """Does nothing; a reader that collects errors logs a warning about a valid value.
 
         Args:
             key: Key of the entry.
             what: The value, and why it is suspicious.
+            hint: What probably helps.
         """
 
     def report(self, error: FlatlandError) -> None:
@@ -495,8 +497,8 @@ class YamlReader:
         place = self._node.source.place(line or self._node.line)
         return YamlError(message + where + place.suffix, place=place, hint=hint)
 
-    def _invalid(self, why: str) -> YamlError:
-        return self._error(f"Invalid {self.name}, {why}")
+    def _invalid(self, why: str, hint: str = "") -> YamlError:
+        return self._error(f"Invalid {self.name}, {why}", hint=hint)
 
     def _check_kind(self, kind: NodeKind) -> None:
         if not {"any": True, "map": self.is_map, "list": self.is_list}[kind]:
@@ -566,11 +568,12 @@ class YamlReader:
         hint = hints.wrong_size(self.name)
         raise self._error(f"Entry {self._label()}must have size {required}", hint=hint)
 
-    def _checked(self, value: T, limits: Limits) -> T:
+    def _checked(self, value: T, limits: Limits, kind: Kind) -> T:
         why = unmet_limit(value, **limits) if limits else ""
         if why:
             got = list(value) if isinstance(value, tuple) else value
-            raise self._invalid(f"{why}, got {got}")
+            hint = hints.unmet_limit(value, kind, f"{self.location} {self.name}")
+            raise self._invalid(f"{why}, got {got}", hint)
         return value
 
     def _convert(self, kind: Kind) -> Any:
@@ -587,5 +590,5 @@ class YamlReader:
         except ValueError:
             pass
         text = self._node.text if isinstance(self._node, ScalarNode) else ""
-        hint = hints.conversion(text, type_name)
+        hint = hints.conversion(text, type_name, self.location)
         raise self._error(f"Error converting entry {self._label()}to {type_name}", hint=hint)

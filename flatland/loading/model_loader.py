@@ -225,7 +225,7 @@ class ModelLoader:
             options["limits"] = _read_limits(reader)
         else:
             create = self._physics.create_weld_joint
-            options["reference_angle"] = reader.get("angle", "float", 0.0, finite=True)
+            options["reference_angle"] = reader.get("angle", "angle", 0.0, finite=True)
             options["frequency"] = reader.get("frequency", "float", 0.0, finite=True, minimum=0)
             options["damping"] = reader.get("damping", "float", 0.0, finite=True, minimum=0)
         if not is_known:
@@ -246,7 +246,7 @@ def _check_choice(reader: YamlReader, value: str, choices: Sequence[str], proble
 
 
 def _read_limits(reader: YamlReader) -> tuple[float, float] | None:
-    limits = reader.get_list("limits", "float", None, size=2, finite=True)
+    limits = reader.get_list("limits", "angle", None, size=2, finite=True)
     if limits is None:
         return None
     lower, upper = limits

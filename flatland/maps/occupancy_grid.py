@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
+from flatland.config.hints import choice
 from flatland.config.reader import YamlReader
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray
@@ -49,7 +50,9 @@ class ImageGrid:
         self._negate = _read_flag(reader, "negate")
         self._mode: str = reader.get("mode", "string", "trinary")
         if self._mode not in _MODES:
-            raise reader.invalid("mode", f"must be one of: {', '.join(_MODES)}, got {self._mode}")
+            error = reader.invalid("mode", f"must be one of: {', '.join(_MODES)}, got {self._mode}")
+            error.hint = choice(self._mode, _MODES)
+            reader.report(error)
 
     def load(self) -> OccupancyGrid:
         """Reads the image.
@@ -168,7 +171,7 @@ def _read_flag(reader: YamlReader, key: str) -> bool:
     text = reader.get(key, "string", "0")
     if text in ("0", "1"):
         return text == "1"
-    return reader.get(key, "bool")
+    return reader.get(key, "bool", False)
 
 
 def _cells_of_edges(edges: DoubleArray) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:

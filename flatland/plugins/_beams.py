@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flatland.config.hints import did_you_mean
+from flatland.config.hints import MAX_TURNS, did_you_mean
 from flatland.physics import BeamFan
 from flatland.plugin_api.parameters import at_key, read_choice
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from flatland.plugin_api.plugin_world import PluginWorld
 
 MAX_BEAMS = 1_000_000
+_FEW_BEAMS = 3  # which may have any angles
+_WIDE = 0.5  # rad between beams, 29 degrees
 MAX_RANGE = 1e6  # m; the spacing of single-precision numbers is 6 cm there
 
 
@@ -32,16 +34,17 @@ class BeamAngles:
     count: int
 
     @classmethod
-    def from_config(cls, reader: YamlReader) -> BeamAngles:
+    def from_config(cls, config: YamlReader) -> BeamAngles:
         """Reads the beam angles.
 
         Args:
-            reader: Reader of the map `angle`.
+            config: Parameters of the plugin, with the map `angle`.
 
         Raises:
             YamlError: A number is missing or not finite, the sign of the increment does not fit
                 the limits, or there would be more than `MAX_BEAMS` beams.
         """
+        reader = config.subnode("angle", "map")
         numbers = [reader.get(key, "float") for key in ("min", "max", "increment")]
         reader.ensure_accessed_all()
         if not all(map(math.isfinite, numbers)):
@@ -60,6 +63,7 @@ class BeamAngles:
                 f"{maximum} in steps of {increment}"
             )
         count = math.floor((maximum - minimum) / increment + 0.5) + 1
+        _warn_about_degrees(config, minimum, maximum, increment, count)
         return cls(minimum, maximum, increment, count)
 
     @functools.lru_cache(maxsize=16)  # noqa: B019 - shared by all robots of one kind
@@ -74,6 +78,28 @@ class BeamAngles:
     def fan(self, length: float, upside_down: bool) -> BeamFan:
         """Returns the beams of a length [m] prepared for scans, sensor frame."""
         return BeamFan(self.end_points(length, upside_down))
+
+
+def _warn_about_degrees(
+    config: YamlReader, minimum: float, maximum: float, increment: float, count: int
+) -> None:
+    """Logs a warning about angles that are probably in degrees, if the reader collects errors."""
+    numbers = {"min": minimum, "max": maximum, "increment": increment}
+    angles = ", ".join(f"{key}: {number:g}" for key, number in numbers.items())
+    hint = ", ".join(f"{key}: {math.radians(number):.6g}" for key, number in numbers.items())
+    turns = max(map(abs, (minimum, maximum, maximum - minimum))) / math.tau
+    if turns > MAX_TURNS:
+        what = f"{{{angles}}}, which is more than a full turn"
+        config.warn("angle", what, f"angles are in radians; for degrees, write {{{hint}}}")
+    elif (
+        count > _FEW_BEAMS
+        and abs(increment) >= _WIDE
+        and (2 * increment).is_integer()
+        and any(math.remainder(angle, increment) for angle in (minimum, maximum))
+    ):
+        what = f"{{{angles}}}, which are only {count} beams"
+        only = f"increment: {math.radians(increment):.6g}"
+        config.warn("angle", what, f"angles are in radians; for degrees, write {only}")
 
 
 def end_points(angles: DoubleArray, length: float) -> FloatArray:

@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from flatland.config.hints import degrees
 from flatland.plugin_api.body_drive import BodyDrive
 from flatland.plugin_api.drive import CommandGuard
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
@@ -109,7 +110,8 @@ class AckermannDrive(BodyDrive):
         if not 0.0 < self.max_steer_angle <= _LARGEST_ANGLE:
             raise at_key(config, "max_steer_angle").error(
                 f'Invalid "max_steer_angle", must be above 0 and at most {_LARGEST_ANGLE:.3f}, '
-                f"got {self.max_steer_angle}"
+                f"got {self.max_steer_angle}",
+                degrees(self.max_steer_angle),
             )
         self.read_limits(config)
         self.geometry = CarGeometry.from_config(config, self.model, self.body)

@@ -50,7 +50,7 @@ class Hitch(ModelPlugin):
         self._origin = read_point(config, "origin")
         self._type = read_choice(config, "joint", TYPES)
         self._reach: float = config.get("reach", "float", 0.1, minimum=0, maximum=MAX_COORDINATE)
-        self._max_angle: float = config.get("max_angle", "float", 0.0, minimum=0, maximum=math.pi)
+        self._max_angle: float = config.get("max_angle", "angle", 0.0, minimum=0, maximum=math.pi)
         if self._max_angle and self._type == "weld":
             raise at_key(config, "max_angle").error('"max_angle" requires "joint: hinge"')
         self._names = config.get_list("models", "string", [])

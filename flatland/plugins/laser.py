@@ -60,7 +60,7 @@ class Laser(RangeSensor):
             PluginError: The topic is not a legal name.
         """
         self._read_mounting(config)
-        self.angles = BeamAngles.from_config(config.subnode("angle", "map"))
+        self.angles = BeamAngles.from_config(config)
         self.origin = read_pose(config, "origin")
         self.scan_time, self.time_increment = self._read_times(config)
         noise = self._read_updates(config, "scan")

@@ -10,7 +10,6 @@ from flatland.plugin_api.parameters import (
     at_key,
     read_body,
     read_choice,
-    read_finite,
     read_not_negative,
     read_positive,
 )
@@ -100,5 +99,6 @@ def _read_wheels(config: YamlReader) -> tuple[GroundWheel, ...]:
     if layout == "mecanum":
         return mecanum_wheels(read_positive(config, "wheelbase"), read_positive(config, "track"))
     return three_wheels(
-        read_positive(config, "wheel_distance"), read_finite(config, "wheel_angle", math.pi / 3)
+        read_positive(config, "wheel_distance"),
+        config.get("wheel_angle", "angle", math.pi / 3, finite=True),
     )

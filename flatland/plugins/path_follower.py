@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from flatland.plugin_api.plugin import ModelPlugin
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from flatland.config.convert import FloatKind
     from flatland.config.reader import YamlReader
     from flatland.physics import SpeedLimits
     from flatland.plugin_api.ports import Command
@@ -30,6 +31,7 @@ FRAMES = ("start", "world")
 HEADINGS = ("waypoint", "forward")
 
 _NUMBERS = {"waypoint": (2, 3), "forward": (2,)}  # of a waypoint
+_KINDS: Final[tuple[FloatKind, ...]] = ("float", "float", "angle")
 _FORMS = {2: "[x, y]", 3: "[x, y, theta]"}
 
 
@@ -141,8 +143,8 @@ def _read_waypoints(config: YamlReader, heading: str) -> list[Pose]:
             expected = " or ".join(_FORMS[size] for size in sizes)
             raise entry.error(f'A waypoint with "heading: {heading}" must be {expected}')
         numbers = [
-            entry.get(i, "float", finite=True, minimum=-MAX_COORDINATE, maximum=MAX_COORDINATE)
-            for i in range(len(entry))
+            entry.get(i, kind, finite=True, minimum=-MAX_COORDINATE, maximum=MAX_COORDINATE)
+            for i, kind in zip(range(len(entry)), _KINDS, strict=False)
         ]
         waypoints.append((numbers[0], numbers[1], numbers[2] if len(numbers) > 2 else 0.0))
     if not waypoints:

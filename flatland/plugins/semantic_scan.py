@@ -37,7 +37,7 @@ class SemanticScan(RangeSensor):
             PluginError: The topic is not a legal name.
         """
         self._read_mounting(config)
-        self.angles = BeamAngles.from_config(config.subnode("angle", "map"))
+        self.angles = BeamAngles.from_config(config)
         self.origin = read_pose(config, "origin")
         self.classes = self._read_classes(config)
         noise = self._read_updates(config, "semantic_scan")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from flatland.config.hints import degrees
 from flatland.physics import RangeFinder
 from flatland.plugin_api.parameters import at_key, read_choice, read_pose
 from flatland.plugins._beams import MAX_BEAMS, end_points, read_layers, read_no_hit
@@ -63,7 +64,7 @@ class Sonar(RangeSensor):
         angle: float = config.get("field_of_view", "float")
         if not 0 <= angle <= math.tau:
             raise at_key(config, "field_of_view").error(
-                f'Invalid "field_of_view", must be from 0 to 2 pi, got {angle}'
+                f'Invalid "field_of_view", must be from 0 to 2 pi, got {angle}', degrees(angle)
             )
         return angle
 

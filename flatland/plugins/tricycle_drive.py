@@ -99,7 +99,7 @@ class TricycleDrive(BodyDrive):
             PluginError: A topic is not a legal name.
         """
         self.body = read_body(config, self.model)
-        self._max_steer_angle = read_not_negative(config, "max_steer_angle", 0.0)
+        self._max_steer_angle = config.get("max_steer_angle", "angle", 0.0, minimum=0)
         self.read_limits(config)
         self.geometry = TricycleGeometry(config, self.model, self.body)
         # Unlike the reference: odometry has its own frame, not the frame of the ground truth.

@@ -18,6 +18,14 @@ IMAGE_MAP = "image: %s\nresolution: %s\norigin: [0, 0, 0]\noccupied_thresh: 0.65
 BODY = "{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}"
 MODEL = f"bodies: [{BODY}]\n"
 LASER = "{type: Laser, name: %s, body: base, range: 5, angle: {min: 0, max: 1, increment: 1}%s}"
+IN_RAD = "angles are in radians; "
+DEGREES = "angles are in radians; for degrees, write "
+JOINTED = """\
+bodies: [{name: b, pose: [0, 0, -22.5], footprints: []}, {name: d, footprints: []}]
+joints:
+- {type: revolute, name: j, limits: [-45, 45],
+   bodies: [{name: b, anchor: [0, 0]}, {name: d, anchor: [0, 0]}]}
+"""
 DRIVE = "{type: DiffDrive, name: drive, body: base%s}"
 ROBOT = "models:\n- {name: r, model: robot.yaml, pose: %s}\n"
 
@@ -220,6 +228,66 @@ MISTAKES: dict[str, Mistake] = {
         ("map.yaml", 4, '~Layer "room": "occupied_thresh" is 65, outside the range', ""),
         map=(IMAGE_MAP % ("room.png", 0.05)).replace("0.65", "65"),
     ),
+    "keys of a published map": of_world(
+        WORLD.replace("room.yaml", "map.yaml"),
+        (
+            "map.yaml",
+            5,
+            '~Error converting entry "negate" to bool (in layer "room"), so',
+            "true or",
+        ),
+        ("map.yaml", 6, '~Invalid "mode", must be one of: trinary, scale, raw, got tinary', "did"),
+        map=IMAGE_MAP % ("room.png", 0.05) + "negate: no thanks\nmode: tinary\n",
+    ),
+    "a white image": of_world(
+        WORLD.replace("room.yaml", "map.yaml"),
+        ("map.yaml", 1, '~Layer "room", image "{folder}/white.png": all 400 pixels are free', ""),
+        map=IMAGE_MAP % ("white.png", 0.05),
+    ),
+    "angles in degrees": of_world(
+        WORLD.replace("room.yaml", "map.yaml") + ROBOT % "[0.2, 0.2, 90]",
+        ("map.yaml", 3, '~"origin" is [0, 0, 45], with an angle of more than a full turn', IN_RAD),
+        ("world.yaml", 4, '~"pose" is [0.2, 0.2, 90], with an angle of more than a', IN_RAD),
+        ("robot.yaml", 1, '~"pose" is [0, 0, -22.5], with an angle of', IN_RAD),
+        ("robot.yaml", 3, '~"limits" is [-45, 45], with an angle of', IN_RAD),
+        ("robot.yaml", 6, '~"angle" is {min: -90, max: 90, increment: 0.5}, which is', DEGREES),
+        ("robot.yaml", 6, '~"origin" is [0, 0, 180], with an angle of more than', IN_RAD),
+        ("robot.yaml", 7, '~"angle" is {min: -1.57, max: 1.57, increment: 1}, which are', DEGREES),
+        ("robot.yaml", 8, '~"delta" is [0, 0, 90], with an angle of', IN_RAD),
+        ("robot.yaml", 9, '~"waypoints" is 270, with an angle of', IN_RAD),
+        map=(IMAGE_MAP % ("room.png", 0.05)).replace("0, 0]", "0, 45]"),
+        robot=JOINTED + "plugins:\n"
+        "- {type: Laser, name: a, body: b, range: 5, angle: {min: -90, max: 90, increment: 0.5}, "
+        "origin: [0, 0, 180]}\n"
+        "- {type: Laser, name: c, body: b, range: 5, topic: c, "
+        "angle: {min: -1.57, max: 1.57, increment: 1}}\n"
+        "- {type: Tween, name: t, body: b, delta: [0, 0, 90]}\n"
+        "- {type: PathFollower, name: p, body: d, waypoints: [[0, 0, 270], [1, 0]]}\n",
+    ),
+    "angles of up to a full turn, and whole turns": of_model(
+        JOINTED.replace("-22.5", "-6.2832").replace("[-45, 45]", "[-3.14, 3.14]") + "plugins:\n"
+        "- {type: Laser, name: a, body: b, range: 5, origin: [0, 0, 4.712], "
+        "angle: {min: 0, max: 6.2832, increment: 0.5236}}\n"
+        "- {type: Tween, name: t, body: b, delta: [0, 0, 12.566]}\n",
+    ),
+    "angles in degrees that are errors": of_model(
+        plugins(
+            "{type: Hitch, name: h, max_angle: 30}",
+            "{type: Sonar, name: s, body: base, range: 4, field_of_view: 30}",
+        ),
+        (
+            "robot.yaml",
+            3,
+            'Model Plugin "h" type "Hitch" model "robot": Flatland YAML: Inv',
+            IN_RAD,
+        ),
+        (
+            "robot.yaml",
+            4,
+            'Model Plugin "s" type "Sonar" model "robot": Flatland YAML: Inv',
+            IN_RAD,
+        ),
+    ),
     "radius 0 and colours up to 255": of_model(
         MODEL.replace("radius: 0.2", "radius: 0").replace(
             "base,", "base, color: [255, 0, 0, 255],"
@@ -259,6 +327,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     pixels[2:18, 2:18] = 255
     for name in ("room.png", "plain.png"):
         Image.fromarray(pixels).save(tmp_path / name)
+    Image.fromarray(np.full_like(pixels, 255)).save(tmp_path / "white.png")
     (tmp_path / "empty.png").touch()
     (tmp_path / "lfs.png").write_text("version https://git-lfs.example/spec/v1\noid sha256:1\n")
     (tmp_path / "room.dat").write_text("0 0 6 0\n6 0 6 6\n6 6 0 6\n0 6 0 0\n")

@@ -19,7 +19,31 @@ from flatland.config import hints
         ("5m", "float", "numbers are written without a unit: 5"),
         ("10 Hz", "float", "numbers are written without a unit: 10"),
         ("10.0", "int", "a whole number without a point is required, such as 10"),
-        ("pi/2", "float", "expressions start with $eval: $eval pi/2"),
+        ("pi/2", "float", "expressions start with $eval: $eval math.pi/2"),
+        ("math.sqrt(2) * 3", "float", "expressions start with $eval: $eval math.sqrt(2) * 3"),
+        ("1/2", "int", "expressions start with $eval: $eval 1/2"),
+        (
+            "${pi/4}",
+            "float",
+            "expressions of xacro and of launch files are not evaluated here; use "
+            "$eval: $eval math.pi/4",
+        ),
+        (
+            "$(arg r)",
+            "float",
+            "expressions of xacro and of launch files are not evaluated here; use "
+            '$eval, such as $eval param("/name", 1)',
+        ),
+        ("5cm", "float", "numbers are written without a unit: 0.05"),
+        ("36 km/h", "float", "numbers are written without a unit: 10"),
+        ("3 feet", "float", "numbers are written without a unit, but in SI units"),
+        ("90 deg/s", "float", "angular velocities are in rad/s: $eval math.rad(90)"),
+        ("-nan", "float", "nan is the result of an invalid computation, such as 0/0"),
+        ("-1.#IND", "float", "nan is the result of an invalid computation, such as 0/0"),
+        ("-Infinity", "float", "infinity is written -.inf"),
+        ("front-left", "float", ""),
+        ("1 +", "float", ""),
+        ("9" * 10_000 + "+", "float", ""),
         ("maybe", "bool", "true or false"),
         ("fast", "float", ""),
         ("", "vector", "two numbers are written as [x, y]"),
@@ -27,6 +51,28 @@ from flatland.config import hints
 )
 def test_conversion(text, kind, hint):
     assert hints.conversion(text, kind) == hint
+
+
+def test_the_angle_of_a_map_of_map_saver():
+    hint = hints.conversion("-nan", "float", 'layer "walls" "origin"')
+    assert hint.startswith("map_saver writes nan if the orientation of the map is not a valid")
+    pose = (1.0, 2.0, float("nan"))
+    assert hints.unmet_limit(pose, "pose", 'layer "walls" "origin"') == hint
+    assert hints.unmet_limit(pose, "pose", 'model "robot" "pose"') == ""
+
+
+@pytest.mark.parametrize(
+    ("angle", "radians"),
+    [(90, 1.5708), (-180, -3.14159), (22.5, 0.392699), (7, 0.122173), (355, 6.19592)],
+)
+def test_angles_in_degrees(angle, radians):
+    text = f"angles are in radians; {angle:g} degrees are {radians:g}, or $eval math.rad({angle:g})"
+    assert hints.degrees(angle) == text
+
+
+@pytest.mark.parametrize("angle", [0, 6.28, -6.3, 7.854, 9.42, 12.566, -18.85, float("inf")])
+def test_angles_in_radians(angle):
+    assert hints.degrees(angle) == ""
 
 
 @pytest.mark.parametrize(
