@@ -11,6 +11,7 @@ from typing import Final
 
 from flatland.config.composer import Composer, end_position, malformed
 from flatland.config.files import foreign_kind
+from flatland.config.foreign_files import foreign_file
 from flatland.config.hints import similar_file
 from flatland.config.inputs import Inputs
 from flatland.config.node import Node, Source
@@ -50,6 +51,7 @@ def load_documents(path: str, inputs: Inputs) -> list[Node]:
     except YamlError as error:
         kind = foreign_kind(content)
         if kind is None:
+            error.hint = foreign_file(content) or error.hint
             raise
         name = {"image": "an image", "data": "a data file of line segments"}[kind]
         hint = f"this is {name}; a YAML file is expected here"

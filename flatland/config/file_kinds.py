@@ -14,6 +14,7 @@ from flatland.config.files import (
     foreign_kind,
     open_regular,
 )
+from flatland.config.foreign_files import foreign_file
 from flatland.config.inputs import Inputs
 from flatland.config.node import MapNode, Node, NullNode, ScalarNode
 from flatland.errors import YamlError
@@ -81,6 +82,8 @@ def mistaken_file(root: Node, key: str = "") -> str:
     if isinstance(root, ScalarNode) and root.text.startswith(LFS_START.decode()):
         return LFS_HINT
     found = kind_of(root)
+    if found is None and isinstance(root, ScalarNode):
+        return foreign_file(root.text.encode("utf-8", "replace"))
     if found == "data":
         return f'this is {_NAMES[found]}; a map file names it under "data"'
     expected = [kind for kind, keys in REQUIRED_KEYS.items() if key in keys]

@@ -10,6 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 from flatland.config.files import IMAGE_SUFFIXES
+from flatland.config.foreign_files import escape_error, foreign_path
 
 _MIN_SIMILARITY = 0.6
 # A word that is more similar than this is a typing mistake. Otherwise, several words may be meant:
@@ -317,8 +318,11 @@ def similar_file(path: str, accepts: Callable[[Path], bool] = is_yaml_name) -> s
     """
     file = Path(path)
     try:
-        if file.exists():
+        if "\0" not in path and file.exists():
             return ""
+        foreign = foreign_path(path)
+        if foreign:
+            return foreign
         slashed = Path(os.path.normpath(path.replace("\\", "/")))
         if "\\" in path:
             found = f': "{slashed}"' if slashed.exists() else ""
@@ -353,6 +357,8 @@ def malformed(why: str, text: str) -> str:
     if marker:
         line = text.count("\n", 0, marker.start()) + 1
         return f"line {line} is a conflict marker of a merge, {marker[1]}; resolve the conflict"
+    if escape := escape_error(why):
+        return escape
     if "cannot start any token" in why:
         return "indent with spaces, not with tabs, and quote values that start with @, ` or %"
     if "mapping values are not allowed" in why:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from flatland.config.files import read_regular
+from flatland.config.foreign_files import foreign_file
 from flatland.errors import MapFileError, Place
 
 _COLUMNS = 4
@@ -49,6 +51,15 @@ def read_line_segments(path: str) -> npt.NDArray[np.float64]:
     return np.array([_parse(line, number, path) for number, line in numbered])
 
 
+def _hint(line: str) -> str:
+    """Returns a hint for a line that is not a segment."""
+    if re.search(r"[,;]", line):
+        return "numbers are separated by spaces, not by commas"
+    foreign = foreign_file(line.encode("utf-8", "replace"))
+    form = "each line has four numbers, x1 y1 x2 y2; lines that start with # are comments"
+    return f"{foreign}; {form}" if foreign else form
+
+
 def _parse(line: str, number: int, path: str) -> list[float]:
     try:
         segment = [float(word) for word in line.split(maxsplit=_COLUMNS)[:_COLUMNS]]
@@ -59,6 +70,6 @@ def _parse(line: str, number: int, path: str) -> list[float]:
             f'Failed to read line segment from line {number}, in file "{Path(path).name}"'
             f" [{path}:{number}]",
             place=Place(path, number),
-            hint="each line has four numbers, x1 y1 x2 y2; lines that start with # are comments",
+            hint=_hint(line),
         )
     return segment

@@ -7,6 +7,7 @@ from typing import Final
 
 from flatland.config.file_kinds import missing_file
 from flatland.config.files import LFS_HINT, LFS_START, foreign_kind, open_regular
+from flatland.config.foreign_files import foreign_file
 
 _HEADER_SIZE: Final = 512  # bytes
 _TAIL_SIZE: Final = 64  # bytes, in which the end of an image is searched
@@ -39,7 +40,8 @@ def why_unreadable(path: str, error: OSError) -> str:
     if head.startswith(LFS_START):
         return LFS_HINT
     if foreign_kind(head) != "image":
-        return "the file is not an image"
+        foreign = foreign_file(head)
+        return f"the file is not an image; {foreign}" if foreign else "the file is not an image"
     if _is_truncated(head, tail, size):
         return f"the image is truncated after {size} bytes; copy or download the file again"
     detail = f" ({error.__cause__})" if str(error.__cause__ or "") else ""

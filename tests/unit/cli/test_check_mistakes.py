@@ -181,6 +181,49 @@ MISTAKES: dict[str, Mistake] = {
         ("robot.yaml", 1, 'Entry "image" does not exist', "this is a model file; a map file is"),
         robot=MODEL,
     ),
+    # Files and paths of other programs.
+    "URDF in place of a model": of_world(
+        f"{WORLD}models: [{{name: r, model: robot.yaml}}]\n",
+        ("robot.yaml", 1, "Entry must be a map", "this is a URDF file of a robot; a model file is"),
+        robot='<robot name="r">\n  <link name="base"/>\n</robot>\n',
+    ),
+    "launch file in place of a world": Mistake(
+        {"demo.launch": '<launch>\n  <arg name="a" default="b: c"/>\n</launch>\n'},
+        [("demo.launch", 2, "Malformatted file, path", "this is a launch file; give the world")],
+    ),
+    "octile map": of_world(
+        WORLD,
+        ("room.yaml", 1, "Entry must be a map (in layer", "this is a map of the Moving"),
+        room="type octile\nheight 2\nwidth 2\nmap\n@@\n..\n",
+    ),
+    "CSV in place of line segments": of_world(
+        WORLD.replace("room.yaml", "map.yaml"),
+        ("rows.yaml", 1, "Failed to read line segment from line 1", "numbers are separated by sp"),
+        map=LINES.replace("room.dat", "rows.yaml"),
+        rows="0,0,6,0\n",
+    ),
+    "launch file in place of an image": of_world(
+        WORLD.replace("room.yaml", "map.yaml"),
+        ("map.yaml", 1, 'Failed to load "', "the file is not an image; this is a launch file"),
+        map=IMAGE_MAP % ("demo.yaml", 0.05),
+        demo="<launch/>\n",
+    ),
+    "path of a package": of_world(
+        WORLD.replace("room.yaml", "package://maps/room.yaml"),
+        ("world.yaml", 2, "File does not exist", "package:// is not resolved; write a path rel"),
+    ),
+    "path of a launch file": of_world(
+        f'{WORLD}models: [{{name: r, model: "$(find robots)/robot.yaml"}}]\n',
+        ("world.yaml", 3, "File does not exist", "$(find ...) is replaced in launch files only"),
+    ),
+    "backslash in double quotes": of_world(
+        WORLD.replace("room.yaml", r'"C:\maps\room.yaml"'),
+        ("world.yaml", 2, "Malformatted file", "in double quotes, a backslash begins an escape"),
+    ),
+    "backslash that is a line break": of_world(
+        WORLD.replace("room.yaml", r'"maps\new.yaml"'),
+        ("world.yaml", 2, "File does not exist", "in double quotes, a backslash begins an escape"),
+    ),
     # Texts.
     "conflict of a merge": of_world(
         "properties: {}\nlayers:\n<<<<<<< HEAD\n- {name: a}\n=======\n- {name: b}\n>>>>>>> b\n",
