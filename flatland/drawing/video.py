@@ -63,6 +63,7 @@ class VideoFile:
                 break
             _LOG.warning('OpenCV has no encoder for the codec "%s"', self.codec)
         else:
+            _check_writable(self._path)
             raise OSError(f"OpenCV cannot write {path} with the codecs {', '.join(_CODECS)}")
 
     def write(self, image: npt.NDArray[np.uint8]) -> None:
@@ -81,10 +82,18 @@ class VideoFile:
         self._is_closed = True
         self._writer.release()
         if self.frames and not _is_complete(self._path):
-            # OpenCV does not say why; a full disk does not take these bytes either.
-            with self._path.open("ab") as file:
-                file.write(bytes(_PROBE))
+            _check_writable(self._path)
             raise OSError(f"OpenCV did not write all of {self._path}")
+
+
+def _check_writable(path: Path) -> None:
+    """Raises the error that OpenCV does not report: a full disk does not take these bytes either.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    with path.open("ab") as file:
+        file.write(bytes(_PROBE))
 
 
 def _is_complete(path: Path) -> bool:

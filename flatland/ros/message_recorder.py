@@ -78,12 +78,19 @@ def record_bag(path: str | os.PathLike[str]) -> MessageRecorder:
         OSError: The file cannot be created.
     """
     require("tf2_msgs.msg", "bags need")  # Transforms are recorded in any case.
-    bag = require("rosbag", "bags need").Bag(os.fspath(path), "w")
+    bag_class = require("rosbag", "bags need").Bag
+    # Not opened by `Bag`, which leaves it open if the index cannot be written.
+    file = Path(path).open("w+b")  # noqa: SIM115 - closed by `finish`
+    bag = bag_class(file, "w")
 
     def write(topic: str, message: Any, time_ns: int, _sequence: int) -> None:
         bag.write(topic, message, convert.time(max(time_ns, _FIRST_TIME)))
 
-    return _recorder(write, bag.close)
+    def finish() -> None:
+        with file:
+            bag.close()
+
+    return _recorder(write, finish)
 
 
 def record_mcap(path: str | os.PathLike[str], *, ends_on_error: bool = False) -> MessageRecorder:

@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 import pytest
 from flatland_command import main
+from full_disk import REASON, limited_files
 from programs import Program
 from waiting import TIMEOUT, wait_until
 
@@ -195,6 +196,42 @@ class TestInterruption:
         messages = read_bag(tmp_path / "a.bag")
         assert messages["/tf"][-1][0] == pytest.approx(float(end[1]), abs=0.06)
         assert not part.exists()
+
+
+class TestFullDisk:
+    def test_a_recording_that_is_cut_is_named(self, robot_world, tmp_path, capsys):
+        with limited_files(4000):
+            assert main("run", robot_world, "--duration", "9", "--record", "a.flog") == 1
+        captured = capsys.readouterr()
+        assert re.search(
+            rf"^flatland: a\.flog is incomplete: {REASON}, at step \d+$", captured.err, re.MULTILINE
+        )
+        assert "wrote" not in captured.out
+        # It is repeated as far as possible.
+        assert main("replay", "a.flog") == 1
+        first, second = capsys.readouterr().out.splitlines()
+        assert re.fullmatch(r"a\.flog: [1-9]\d* steps \(\d+ s\), no difference", first)
+        assert second.startswith("the recording is incomplete")
+        assert (tmp_path / "a.flog").stat().st_size <= 4000
+
+    @pytest.mark.parametrize(
+        ("option", "name"), [("--bag", "a.bag"), ("--mcap", "a.mcap"), ("--video", "a.mp4")]
+    )
+    @pytest.mark.parametrize("size", [0, 5000])
+    def test_other_files_are_removed_and_named(
+        self, robot_world, tmp_path, capsys, option, name, size
+    ):
+        if option != "--video":
+            pytest.importorskip("rosbag")
+        Path(name).write_text("old")
+        arguments = ["--size", "320x240", "--no-axes"]
+        with limited_files(size):
+            assert main("run", robot_world, "--duration", "2", option, name, *arguments) == 1
+        captured = capsys.readouterr()
+        assert f"{REASON}: '{name}'" in captured.err
+        assert "wrote" not in captured.out
+        assert (tmp_path / name).read_text() == "old"
+        assert not list(tmp_path.glob("*.part.*"))
 
 
 class TestVideo:

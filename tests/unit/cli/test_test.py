@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import re
 import signal
 import sys
+from pathlib import Path
 
 import pytest
 from flatland_command import main
 from forked_workers import CONTEXT
-from programs import Program
+from full_disk import REASON
+from programs import Program, run_program
 from waiting import wait_until
+
+from flatland.scenarios.results import locked
 
 WORLD = """
     properties: {}
@@ -36,6 +41,9 @@ class Slow:
         bearing = math.atan2(goal[1] - pose[1], goal[0] - pose[0]) - pose[2]
         turn = math.remainder(bearing, math.tau)
         return flatland.Twist(linear_x=0.3 if abs(turn) < 0.5 else 0.0, angular_z=2 * turn)
+
+class Still(Slow):
+    def command(self, scan, pose, goal): return flatland.Twist()
 
 class Late(Slow):
     def command(self, scan, pose, goal):
@@ -159,6 +167,76 @@ def test_a_baseline_without_runs_in_common_is_not_passed(suite, capsys):
     assert "no runs in common" in capsys.readouterr().out
     assert main(*run, "--robot", "own.py:Slow") == 1
     assert "own.py:Slow against the baseline:\n  no runs in common" in capsys.readouterr().out
+
+
+def test_a_folder_is_written_by_one_suite_at_a_time(suite, capsys):
+    with locked(suite / "out"):
+        assert main("test", "s.yaml", "--out", "out") == 1
+    assert "another `flatland test` writes to out; wait for its end" in capsys.readouterr().err
+
+
+def test_the_lock_of_a_killed_suite_is_released(suite):
+    command = [sys.executable, "-m", "flatland", "test", "s.yaml", "--out", "out"]
+    program = Program([*command, "--robot", "own.py:Late", "--seeds", "0:50"])
+    wait_until("the journal", (suite / "out" / "unfinished.jsonl").exists)
+    options = ("--robot", "straight", "--seeds", "0", "--out", "out")
+    assert main("test", "s.yaml", *options) == 1
+    program.kill()
+    wait_until("the lock", lambda: main("test", "s.yaml", *options) == 0)
+
+
+LIMITED = """
+import sys
+from full_disk import limited_files
+from flatland import cli
+with limited_files(int(sys.argv.pop(1))):
+    sys.exit(cli.main())
+"""
+
+
+def test_what_is_incomplete_is_named(suite):
+    text = (suite / "s.yaml").read_text().replace("time: 15", "time: 30")
+    (suite / "s.yaml").write_text(text)
+    options = ("--robot", "own.py:Still", "--seeds", "0", "--record", "all", "--out", "out")
+    program = [sys.executable, "-c", LIMITED, "9000", "test", "s.yaml", *options]
+    done = run_program(program, env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)})
+    assert done.returncode == 1
+    first, second = done.stderr.splitlines()
+    pattern = rf"flatland: out/recordings/\S+ is incomplete: {REASON}, at step \d+"
+    assert re.fullmatch(pattern, first), done.stderr
+    assert second == f"flatland: not written: [Errno 27] {REASON}: 'out/report.html'"
+    assert re.search(r"^s +own\.py:Still +1 ", done.stdout, re.MULTILINE)
+    assert "report: " not in done.stdout
+    assert (suite / "out" / "results.json").exists()
+
+
+def test_options_that_are_given_several_times(suite, capsys):
+    text = (suite / "s.yaml").read_text().replace("time: 15", "time: 0.1")
+    (suite / "s.yaml").write_text(text + "\nmatrix: {.robot.max_speed: [0.1, 0.2, 0.3]}")
+    options = ("--seeds", "0", "--seeds", "0:2,5", "--record", "none")
+    patterns = ("--only", "s[robot.max_speed=0.1]", "--only", "*=0.3?")
+    assert main("test", "s.yaml", "--robot", "straight", "--robot", "gap", *options, *patterns) == 1
+    content = json.loads((suite / "flatland-test" / "results.json").read_text())
+    rows = [run["row"] for run in content["runs"]]
+    assert [(row["scenario"], row["seed"], row["controller"]) for row in rows] == [
+        (scenario, seed, controller)
+        for scenario in ("s[robot.max_speed=0.1]", "s[robot.max_speed=0.3]")
+        for seed in (0, 1, 5)
+        for controller in ("straight", "gap")
+    ]
+    report = (suite / "flatland-test" / "report.html").read_text()
+    assert "flatland test s.yaml --robot straight --robot gap" in report
+
+
+def test_names_that_are_not_utf8(suite, capfdbinary):
+    name = os.fsdecode(b"b\xff\x1b.yaml")
+    (suite / "s.yaml").rename(name)
+    out = os.fsdecode(b"o\xff")
+    assert main("test", name, "--robot", "straight", "--seeds", "0", "--out", out) == 0
+    assert main("test", name, "--robot", "straight", "--continue", "--out", out) == 0
+    assert rb"b\udcff\x1b  straight" in capfdbinary.readouterr().out
+    row = json.loads(Path(out, "results.json").read_text())["runs"][0]["row"]
+    assert row["scenario"] == r"b\udcff\x1b"
 
 
 def test_errors_of_scenarios_are_printed_together(suite, capsys):

@@ -7,6 +7,7 @@ import math
 import sys
 
 import pytest
+from full_disk import REASON, limited_files
 
 from flatland.recording import Replay
 from flatland.scenarios.columns import COLUMNS, TIMING
@@ -457,6 +458,17 @@ def test_commands_are_limited_and_recoveries_are_reported(run, room):
     row = run(text, "own.py:Counts").row
     assert row["path_length"] == pytest.approx(0.8, abs=0.01)
     assert row["failures"] == "at most 1 recoveries: recoveries is 2"
+
+
+def test_a_recording_that_is_cut_has_its_reason(run, room):
+    run("limits: {time: 1}")  # The files of the world are read.
+    with limited_files(3000):
+        result = run("limits: {time: 5}\ngoal: [20, 5]", "random", record="all")
+        passed = run(record="failed")
+    assert result.recording_error.startswith(f"{REASON}, at step ")
+    assert (room / "out" / result.recording).stat().st_size <= 3000
+    # Nothing is missing.
+    assert (passed.recording, passed.recording_error) == ("", "")
 
 
 def test_failed_runs_are_recorded_and_can_be_replayed(run, room):

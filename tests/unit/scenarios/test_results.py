@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import html.parser
+import json
 import math
 import xml.etree.ElementTree as ElementTree
 
 import pytest
+from full_disk import REASON, limited_files
 
 from flatland.scenarios.columns import COLUMNS, empty_row, error_row
 from flatland.scenarios.comparison import compare
@@ -16,7 +18,13 @@ from flatland.scenarios.junit import write_junit
 from flatland.scenarios.outline import Outline
 from flatland.scenarios.pictures import run_picture
 from flatland.scenarios.report import Report, worst_first, write_report
-from flatland.scenarios.results import ResultsError, SuiteResults, read_results, write_results
+from flatland.scenarios.results import (
+    ResultsError,
+    SuiteResults,
+    locked,
+    read_results,
+    write_results,
+)
 from flatland.scenarios.sketch import sketch
 from flatland.scenarios.summary import (
     markdown_table,
@@ -74,13 +82,107 @@ def test_results_are_read_as_they_were_written(results, tmp_path):
     ]
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"format": 99}'])
-def test_invalid_results_are_refused(text, tmp_path):
-    (tmp_path / "r.json").write_text(text)
-    with pytest.raises(ResultsError, match=r"r\.json"):
+GOOD = {"format": 1, "definition": "", "missing": 0, "outlines": {}, "runs": []}
+KNOWN = {"scenario": "s", "controller": "c", "seed": 1, "passed": True, "outcome": "reached"}
+KNOWN |= {"success": True}
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "cannot be read"),
+        ("[]", "must be results of `flatland test` in the format 1"),
+        ("{}", "must be results of `flatland test` in the format 1"),
+        ({"format": 99}, "in the format 1, got 99"),
+        ({"format": [1]}, r"in the format 1, got \[1\]"),
+        ({"format": 1}, "definition is missing"),
+        ("[" * 100_000, "cannot be read: lists or maps are nested too deeply"),
+        ('{"format": NaN}', "cannot be read: NaN is not a number"),
+        (b"\xff\xfe", "cannot be read"),
+        (GOOD | {"missing": True}, "missing must be an integer, got true"),
+        (GOOD | {"outlines": []}, r"outlines must be a map, got \[\]"),
+        (GOOD | {"outlines": {"k": [[1]]}}, r"outlines\.k must be a list of lines"),
+        (GOOD | {"runs": {}}, "runs must be a list"),
+        (GOOD | {"runs": ["x"]}, r'runs\[0\] must be a map, got "x"'),
+        (GOOD | {"runs": [{}]}, r"runs\[0\]\.row is missing"),
+        (GOOD | {"runs": [{"row": {}}]}, r"runs\[0\]\.row\.scenario is missing"),
+        (GOOD | {"runs": [{"row": KNOWN}]}, r"runs\[0\]\.outline is missing"),
+        (GOOD | {"runs": [{"row": KNOWN | {"seed": "1"}}]}, 'row.seed must be an integer, got "1"'),
+        (GOOD | {"runs": [{"row": KNOWN | {"time": "1"}}]}, 'row.time must be a number, got "1"'),
+        (GOOD | {"runs": [{"row": KNOWN, "path": [[1]]}]}, "path must be a list of lists of 3"),
+    ],
+)
+def test_invalid_results_are_refused(content, message, tmp_path):
+    text = content if isinstance(content, str | bytes) else json.dumps(content)
+    (tmp_path / "r.json").write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(ResultsError, match=message) as caught:
         read_results(tmp_path / "r.json")
+    assert "r.json" in str(caught.value)
     with pytest.raises(ResultsError, match="cannot be read"):
         read_results(tmp_path / "missing.json")
+
+
+def test_results_of_other_versions_are_read(tmp_path):
+    run = {"row": KNOWN | {"new": 1, "time": 3}, "outline": "", "new": []}
+    (tmp_path / "results.json").write_text(json.dumps(GOOD | {"runs": [run], "new": {}}))
+    (found,) = read_results(tmp_path).rows
+    assert (found["seed"], found["time"], found["clearance"]) == (1, 3, None)
+    assert "new" not in found
+
+
+def test_a_spreadsheet_takes_no_text_for_a_formula(tmp_path):
+    results = SuiteResults("")
+    for seed, text in enumerate(("=1+1", "+1", "-1", "@x", "\t=1", "a=1")):
+        results.add(Result(error_row(("-s", "=c", seed), text)))
+    results.results[0].row["time"] = -1.5
+    write_results(results, tmp_path)
+    with (tmp_path / "results.csv").open() as file:
+        table = list(csv.DictReader(file))
+    errors = [line["error"] for line in table]
+    assert errors == ["'=1+1", "'+1", "'-1", "'@x", "'\t=1", "a=1"]
+    assert (table[0]["scenario"], table[0]["controller"], table[0]["time"]) == (
+        "'-s",
+        "'=c",
+        "-1.5",
+    )
+    # Only in this format.
+    assert read_results(tmp_path).rows[0]["error"] == "=1+1"
+
+
+def test_foreign_texts_are_written_in_all_formats(tmp_path):
+    results = SuiteResults("")
+    results.add(Result(error_row(("s", "c", 0), "bad \udcff " + "A" * 5_000_000)))
+    write_results(results, tmp_path)
+    write_junit(results, tmp_path / "junit.xml")
+    write_report(results, Report(["flatland", "test", "b\udcff.yaml"]), tmp_path / "report.html")
+    for name in ("results.json", "results.csv", "junit.xml", "report.html"):
+        assert "bad \\udcff AAA" in (tmp_path / name).read_text().replace("\\\\", "\\")
+        assert (tmp_path / name).stat().st_size < 60_000
+    with (tmp_path / "results.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == 1
+
+
+def test_a_file_that_cannot_be_written_is_named(results, tmp_path):
+    with limited_files(100), pytest.raises(OSError, match=REASON) as caught:
+        write_results(results, tmp_path)
+    for name in ("results.json", "results.csv"):
+        assert str(tmp_path / name) in str(caught.value)
+    for write, name in (
+        (lambda path: write_junit(results, path), "junit.xml"),
+        (lambda path: write_report(results, Report(), path), "report.html"),
+    ):
+        with limited_files(100), pytest.raises(OSError, match=REASON) as caught:
+            write(tmp_path / name)
+        assert caught.value.filename == str(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_has_one_writer(tmp_path):
+    folder = tmp_path / "out"
+    with locked(folder), pytest.raises(ResultsError, match=r"writes to .*/out;"), locked(folder):
+        pass
+    with locked(folder):
+        pass
 
 
 def test_junit(results, tmp_path):

@@ -44,7 +44,7 @@ transforms = tf2_ros.Buffer()
 listener = tf2_ros.TransformListener(transforms)
 goal = None
 count = 0
-commands = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+commands = rospy.Publisher("cmd_vel", Twist, queue_size=100 if mode == "several" else 1)
 if mode == "localizes":
     sender = tf2_ros.StaticTransformBroadcaster()
     found = TransformStamped()
@@ -104,7 +104,8 @@ def on_scan(scan):
     command.linear.x = 0.5 if abs(bearing) < 0.3 else 0.0
     if mode == "nan":
         command.linear.x = math.nan
-    commands.publish(command)
+    for _ in range(3 if mode == "several" else 1):
+        commands.publish(command)
 
 # The map and the pose of the start arrive before the goal is accepted.
 rospy.wait_for_message("map", OccupancyGrid)
@@ -226,6 +227,15 @@ def test_a_stack_that_fails_is_a_failed_run(drive, monkeypatch):
     assert "sent no command for 10 s" in errors["silent"]
     # The node ends the worker process, and is ended with it.
     assert "ended in each of 1 attempts (signal 9)" in errors["kills"]
+
+
+def test_a_command_for_each_scan_in_each_step_is_not_too_many(drive, room):
+    model = room / "robot.model.yaml"
+    model.write_text(model.read_text().replace("    update_rate: 10\n", ""))
+    for row in drive("drive", "several"):
+        assert row["outcome"] == "reached", row["error"]
+        # No command is awaited in vain.
+        assert row["late_commands"] <= 1
 
 
 def test_a_stack_that_floods_the_simulator_is_a_failed_run(drive):

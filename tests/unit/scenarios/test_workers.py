@@ -5,9 +5,11 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from full_disk import REASON, limited_files
 from waiting import wait_until
 
 from flatland.scenarios.columns import TIMING
@@ -175,7 +177,7 @@ def commands() -> list[bytes]:
 
 
 def test_what_a_controller_starts_ends_with_the_suite(suite):
-    runs, plan = suite(["Forks"])
+    runs, plan = suite(["Forks"], text="limits: {time: 1}")
     (result,) = carry_out(runs, plan).values()
     assert result.row["passed"], result.row["error"]
     assert not any(b"987654.5" in command for command in commands())
@@ -250,6 +252,44 @@ def test_results_of_another_suite_are_not_continued(suite):
     _, continued = suite(["Drives"], continues=True)
     with pytest.raises(ResultsError, match="has results of other scenarios"):
         run_suite(runs[:1], continued)
+
+
+def test_damaged_results_are_not_continued(suite, room):
+    runs, plan = suite(["Drives"], seeds=range(2), workers=1)
+    done = []
+    run_suite(runs, plan, is_stopped=lambda: done, on_result=done.append)
+    journal = room / "out" / "unfinished.jsonl"
+    head, entry = journal.read_text().splitlines()
+    _, continued = suite(["Drives"], seeds=range(2), workers=1, continues=True)
+    for lines, message in (
+        (f"{head}\n{{\n{entry}\n", r"unfinished\.jsonl:2 cannot be read"),
+        (f"{head}\n5\n", r"unfinished\.jsonl:2 must be a map, got 5"),
+        (f'{head}\n{{"row": {{}}}}\n', r"unfinished\.jsonl:2\.row\.scenario is missing"),
+        (f"{head}\n{entry.replace(chr(34) + 'own.py', chr(34) + 'x.py')}\n", "not part of this"),
+        (f"{entry}\n", "has results of other scenarios"),
+        ("[1]\n", "has results of other scenarios"),
+    ):
+        journal.write_text(lines)
+        with pytest.raises(ResultsError, match=message):
+            run_suite(runs, continued)
+    # A process that was killed, or a full disk, cuts the last line; a line may exist twice.
+    journal.write_text(f"{head}\n{entry}\n{entry}\n{entry[:50]}")
+    complete = run_suite(runs, continued)
+    assert [row["seed"] for row in complete.rows] == [0, 1]
+
+
+def test_a_full_disk_ends_a_suite_that_can_be_continued(suite, room):
+    runs, plan = suite(["Drives"], seeds=range(3), workers=1)
+
+    def stop_writing(_result):
+        limit.enter_context(limited_files((room / "out" / "unfinished.jsonl").stat().st_size + 9))
+
+    with ExitStack() as limit, pytest.raises(ResultsError, match=REASON) as caught:
+        run_suite(runs, plan, on_result=stop_writing)
+    assert "unfinished.jsonl cannot be written" in str(caught.value)
+    assert "--continue" in caught.value.hint
+    _, continued = suite(["Drives"], seeds=range(3), workers=1, continues=True)
+    assert [row["seed"] for row in run_suite(runs, continued).rows] == [0, 1, 2]
 
 
 def test_a_suite_needs_runs_with_different_names(suite):
