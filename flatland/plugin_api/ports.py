@@ -333,7 +333,8 @@ class Command(Generic[T]):
 
     def _replace(self, value: T, count: int) -> None:
         """Sets the value, counts it, and only then notifies the plugin."""
-        self.settle()
+        if self._source is not None:
+            self.settle()
         with self._lock:
             self._value = value
             self._received += count
@@ -387,8 +388,8 @@ class Command(Generic[T]):
             raise TypeError(
                 f"command {self.topic} takes {self.value_type.__name__}, got {shown(value)}"
             )
-        if self.on_set is not None:
-            self.on_set(self, value)
+        if self._on_set is not None:
+            self._on_set(self, value)
         if self.accept is None or self.accept(value):
             self._replace(value, 1)
 

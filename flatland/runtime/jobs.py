@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 from collections import deque
 from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from threading import get_ident
 from typing import TYPE_CHECKING, Any
 
 from flatland.errors import PLUGIN_FAULTS
@@ -218,12 +218,13 @@ class Jobs:
                         self.settle()
                     job.is_called = is_called
                     self._queue.set_called(job.id, is_called)
-        if self._repeated and self._is_repeated_due:
+        if not self._later and not self._repeated:
+            return False
+        if self._is_repeated_due:
             self._later.extend(self._repeated)
             self._repeated.clear()
         self._is_repeated_due = True
-        if self._later:
-            self.call_later()
+        self.call_later()
         return bool(self._repeated)
 
     def keep_repeated(self) -> None:
@@ -253,7 +254,7 @@ class Jobs:
         If a function that `call_later` calls uses this, that is the step after the one that is
         being prepared.
         """
-        if self._caller == threading.get_ident():
+        if self._caller and self._caller == get_ident():
             self._repeated.append((plugin, function))
             return
         self._later.append((plugin, function))
@@ -261,12 +262,12 @@ class Jobs:
 
     def call_later(self) -> None:
         """Calls the functions that were passed to `set_later`, once each."""
-        later = self._later
-        self._caller = threading.get_ident()
+        later, call, hook = self._later, self._call, STEP_HOOKS["before"]
+        self._caller = get_ident()
         try:
             for _ in range(len(later)):
                 plugin, function = later.popleft()
-                self._call(plugin, STEP_HOOKS["before"], function, function)
+                call(plugin, hook, function, function)
         finally:
             self._caller = 0
 
@@ -303,8 +304,11 @@ class Jobs:
     def _groups_of(
         self, callbacks: Sequence[int]
     ) -> Iterator[tuple[Callable[[Sequence[Any]], object], list[FlatlandPlugin]]]:
-        found = (self._jobs[callback] for callback in callbacks)
-        jobs = [job for job in found if job.plugin not in self._disabled]
+        jobs = [
+            job
+            for callback in callbacks
+            if (job := self._jobs[callback]).plugin not in self._disabled
+        ]
         start = 0
         for end in range(1, len(jobs) + 1):
             prepare = jobs[start].update.prepare

@@ -306,7 +306,7 @@ class PluginHost:
             function: The function.
             *arguments: Its arguments.
         """
-        if plugin in self.disabled:
+        if self.disabled and plugin in self.disabled:
             return
         if self.costs is not None:
             function = self.costs.timed(plugin, function)

@@ -137,7 +137,7 @@ class Requests:
     @property
     def in_plugin(self) -> bool:
         """Whether the current thread executes code of a plugin."""
-        return bool(self._uses) and self._role in (Role.HOOK, Role.PLUGIN)
+        return self._role in (Role.HOOK, Role.PLUGIN)
 
     def refuse_in_plugin(self, method: str) -> None:
         """Raises if the current thread executes code of a plugin.
@@ -148,7 +148,7 @@ class Requests:
         Raises:
             WorldError: The current thread executes code of a plugin.
         """
-        if self.in_plugin:
+        if self._uses and self.in_plugin:
             raise WorldError(f"{method} must not be called from a plugin's hook")
 
     # -- actions ---------------------------------------------------------------------------
