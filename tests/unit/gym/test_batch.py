@@ -127,6 +127,23 @@ def test_subscribers_do_not_change_results(make: Make, room: Path) -> None:
     assert len(scans) >= STEPS - 3
 
 
+def test_a_function_that_requests_itself_is_called_once_before_each_step(env: Any) -> None:
+    world, plugin = env.worlds[1], env.episodes.agents[1].laser
+    times: list[int] = []
+
+    def repeat() -> None:
+        times.append(world.timekeeper.sim_time_ns)
+        plugin.set_before_step(repeat)
+
+    env.step(np.zeros((COUNT, 2)))
+    start = world.timekeeper.sim_time_ns
+    plugin.set_before_step(repeat)
+    for _ in range(3):
+        env.step(np.zeros((COUNT, 2)))
+    assert times == list(range(start, world.timekeeper.sim_time_ns, 5_000_000))
+    assert len({each.time for each in env.worlds}) == 1
+
+
 def test_a_first_update_is_called_if_it_is_wanted(env: Any) -> None:
     first, second = (agent.laser for agent in env.episodes.agents[:2])
     calls: list[Laser] = []
