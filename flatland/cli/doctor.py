@@ -13,10 +13,8 @@ import importlib.util
 import json
 import os
 import shutil
-import socket
 import subprocess
 import sys
-import urllib.parse
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +23,6 @@ from typing import Any
 _EXAMPLES = ("flatland doctor", "flatland doctor --json")
 _PYTHON = (3, 11)
 _TIMEOUT = 20.0  # s, for each program that is started
-_MASTER_TIMEOUT = 2.0  # s
 _SETUP = "make setup in a clone of flatland"
 _APT = "apt-get install "
 
@@ -170,7 +167,7 @@ def report(*, as_json: bool = False) -> int:
 
 def check_all() -> Iterator[Finding]:
     """Yields the results of all checks."""
-    requirements = _load_requirements()
+    requirements = _load("requirements")
     way = requirements.installation()
     yield from _check_python(way)
     required = [(module, "") for module in requirements.REQUIRED]
@@ -184,13 +181,19 @@ def check_all() -> Iterator[Finding]:
     yield from _check_modules("ROS", _ROS)
     yield from _check_programs()
     yield _check_master()
+    yield _check_own_address()
     yield from _check_display()
 
 
-def _load_requirements() -> Any:
-    """Returns flatland/requirements.py, also if flatland cannot be imported."""
-    path = Path(__file__).parents[1] / "requirements.py"
-    spec = importlib.util.spec_from_file_location("_flatland_requirements", path)
+def _load(name: str) -> Any:
+    """Returns a module of flatland that imports only the standard library.
+
+    Args:
+        name: Name of the module, such as `requirements`; loaded also if flatland cannot be
+            imported.
+    """
+    path = Path(__file__).parents[1] / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(f"_flatland_{name}", path)
     assert spec is not None  # noqa: S101 - the file has the ending of a module
     assert spec.loader is not None  # noqa: S101
     module = importlib.util.module_from_spec(spec)
@@ -331,17 +334,40 @@ def _check_programs() -> Iterator[Finding]:
 
 
 def _check_master() -> Finding:
+    addresses = _load("ros_addresses")
     uri = os.environ.get("ROS_MASTER_URI", "")
     name = "ROS master"
     if not uri:
         return Finding("ROS", name, "info", "ROS_MASTER_URI is not set")
     try:
-        url = urllib.parse.urlsplit(uri)
-        address = (url.hostname or "localhost", url.port or 11311)
-        socket.create_connection(address, _MASTER_TIMEOUT).close()
-    except (OSError, ValueError) as error:
-        return Finding("ROS", name, "info", f"not running at {uri} ({error}); roslaunch starts one")
+        host, port = addresses.master_address(uri)
+    except ValueError as error:
+        return Finding("ROS", name, "info", str(error), "set ROS_MASTER_URI")
+    problem = addresses.connection_problem(host, port)
+    if problem:
+        detail = f"not running at {uri} ({problem}); roslaunch starts one"
+        return Finding("ROS", name, "info", detail)
     return Finding("ROS", name, "info", f"running at {uri}")
+
+
+def _check_own_address() -> Finding:
+    """Checks whether other nodes can connect to a node of this machine."""
+    addresses = _load("ros_addresses")
+    name = "address of nodes"
+    host, variable = addresses.own_host()
+    source = f"from {variable}" if variable else "the name of this machine"
+    detail = f'"{host}", {source}'
+    problem = addresses.own_address_problem()
+    try:
+        master, _ = addresses.master_address(os.environ.get("ROS_MASTER_URI", ""))
+    except ValueError:
+        master = "localhost"
+    if not problem and addresses.is_only_local(host, master):
+        problem = f"only programs on this machine can use it, but the master is on {master}"
+    if not problem:
+        return Finding("ROS", name, "ok", detail)
+    remedy = addresses.remedy(variable)
+    return Finding("ROS", name, "absent", f"no program can connect to {detail}: {problem}", remedy)
 
 
 # -- display -------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ import flatland
 from flatland.cli import check, doctor, info, new, replay, run, show, test, view
 from flatland.errors import FlatlandError
 from flatland.output_files import named_errors
+from flatland.streams import accept_any_text
 
 _BROKEN_PIPE = 128 + signal.SIGPIPE  # exit code in a shell of a program ended by SIGPIPE
 _INTERRUPTED = 128 + signal.SIGINT
@@ -42,6 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Raises:
         SystemExit: The arguments are invalid (code 2), or request the help or version (code 0).
     """
+    accept_any_text()
     try:
         return _run(arguments)
     except KeyboardInterrupt:

@@ -11,13 +11,9 @@ from pathlib import Path
 
 from flatland.config.files import IMAGE_SUFFIXES
 from flatland.config.foreign_files import escape_error, foreign_path
+from flatland.suggestions import did_you_mean as did_you_mean
+from flatland.suggestions import question, similar_names
 
-_MIN_SIMILARITY = 0.6
-# A word that is more similar than this is a typing mistake. Otherwise, several words may be meant:
-# those that are less similar than the best one by at most the margin.
-_TYPO_SIMILARITY = 0.85
-_MARGIN = 0.15
-_MAX_SUGGESTIONS = 4
 _MAX_SHOWN = 40  # characters of a value
 _MAX_FILES = 1000  # of a folder, compared with the name of a missing file
 _CONFLICT_MARKER = re.compile(r"^(<{7}|={7}|>{7})(?: .*)?$", re.MULTILINE)
@@ -98,41 +94,6 @@ _NAN_ANGLE = (
 )
 
 
-def did_you_mean(word: str, candidates: Iterable[str], kind: str = "") -> str:
-    """Returns a question with the candidates that are similar to a word.
-
-    Args:
-        word: The word that is not one of the candidates.
-        candidates: The words that are accepted.
-        kind: What the candidates are, such as `bodies of the model`; all of them are listed if
-            none is similar. Empty for no list.
-    """
-    candidates = list(candidates)
-    similar = _similar(word, candidates)
-    if similar:
-        return _question(similar)
-    return f"{kind}: {', '.join(candidates) or 'none'}" if kind else ""
-
-
-def _question(names: Iterable[str]) -> str:
-    quoted = " or ".join(f'"{name}"' for name in names)
-    return f"did you mean {quoted}?" if quoted else ""
-
-
-def _similar(word: str, candidates: Iterable[str]) -> list[str]:
-    """Returns the candidates that are similar to a word, the most similar one first."""
-    import difflib  # late, since only mistakes need it
-
-    by_lower = {candidate.lower(): candidate for candidate in candidates}
-    lower = word.lower()
-    found = difflib.get_close_matches(lower, by_lower, _MAX_SUGGESTIONS, _MIN_SIMILARITY)
-    if not found:
-        return []
-    ratios = [difflib.SequenceMatcher(None, name, lower).ratio() for name in found]
-    least = ratios[0] - (_MARGIN if ratios[0] < _TYPO_SIMILARITY else 0.0)
-    return [by_lower[name] for name, ratio in zip(found, ratios, strict=True) if ratio >= least]
-
-
 def unknown_key(key: str, known: Iterable[str]) -> str:
     """Returns a hint for a key that is not used.
 
@@ -156,7 +117,7 @@ def missing_key(key: str, unread: dict[str, int]) -> str:
         key: The key.
         unread: Lines of the keys of the map that have not been read.
     """
-    similar = _similar(key, unread)
+    similar = similar_names(key, unread)
     if similar:
         return f'"{similar[0]}" in line {unread[similar[0]]} may be a misspelling of "{key}"'
     return _MISSING_KEYS.get(key, "")
@@ -335,8 +296,8 @@ def similar_file(path: str, accepts: Callable[[Path], bool] = is_yaml_name) -> s
         names: dict[str, list[str]] = {}
         for entry in files:
             names.setdefault(entry.stem, []).append(entry.name)
-        similar = [name for stem in _similar(file.stem, names) for name in sorted(names[stem])]
-        return _question(name for name in similar if accepts(file.parent / name))
+        similar = [name for stem in similar_names(file.stem, names) for name in sorted(names[stem])]
+        return question(name for name in similar if accepts(file.parent / name))
     except (OSError, ValueError):
         return ""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from flatland.errors import YamlError
+from flatland.suggestions import did_you_mean
 
 MAX_LAYERS = 16
 ALL_LAYERS = 0xFFFF
@@ -98,7 +99,8 @@ class CollisionFilter:
             return ALL_LAYERS
         unknown = self.unknown(names)
         if unknown:
-            raise YamlError(f"{{{','.join(unknown)}}} layer(s) does not exist")
+            hint = did_you_mean(unknown[0], self._ids, "layers of the world")
+            raise YamlError(f"{{{','.join(unknown)}}} layer(s) does not exist", hint=hint)
         bits = 0
         for name in names:
             bits |= 1 << self._ids[name] if name in self._ids else 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from flatland.entities.joint import Joint
 from flatland.errors import FlatlandError, WorldError
 from flatland.geometry import IDENTITY, MAX_MAGNITUDE, Pose, Vector2, compose, finite_pose, invert
 from flatland.graph_names import clean_name
+from flatland.suggestions import did_you_mean
 from flatland.uncopied import uncopied
 
 if TYPE_CHECKING:
@@ -79,7 +81,7 @@ class Model(Entity):
         """
         body = self.find_body(name)
         if body is None:
-            raise WorldError(f'Body with name "{name}" does not exist')
+            raise _missing("Body", name, (each.name for each in self.bodies), "bodies of the model")
         return body
 
     def joint(self, name: str) -> Joint:
@@ -90,7 +92,8 @@ class Model(Entity):
         """
         joint = self.find_joint(name)
         if joint is None:
-            raise WorldError(f'Joint with name "{name}" does not exist')
+            names = (each.name for each in self.joints)
+            raise _missing("Joint", name, names, "joints of the model")
         return joint
 
     def plugin(self, name: str) -> ModelPlugin:
@@ -102,7 +105,8 @@ class Model(Entity):
         for plugin in self.plugins:
             if plugin.name == name:
                 return plugin
-        raise WorldError(f'Plugin with name "{name}" does not exist')
+        names = (each.name for each in self.plugins)
+        raise _missing("Plugin", name, names, "plugins of the model")
 
     @property
     def pose(self) -> Pose:
@@ -172,3 +176,17 @@ def _class_of(path: str) -> str:
     """Returns the name of a YAML file without extensions, empty for other paths."""
     name = PurePath(path).name
     return name.partition(".")[0] if name.endswith((".yaml", ".yml")) else ""
+
+
+def _missing(what: str, name: str, names: Iterable[str], kind: str) -> WorldError:
+    """Returns the error for a part of a model that does not exist.
+
+    Args:
+        what: What was looked up, such as `Body`.
+        name: Its name.
+        names: Names of all parts of this kind.
+        kind: See `did_you_mean`.
+    """
+    return WorldError(
+        f'{what} with name "{name}" does not exist', hint=did_you_mean(name, names, kind)
+    )

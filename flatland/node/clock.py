@@ -5,14 +5,16 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any, Final
 
+from flatland.node.stamps import clock_time
 from flatland.node.stamps import set_stamps as set_stamps
 from flatland.node.stamps import stamp as stamp
 from flatland.node.ticker import Ticker
 from flatland.node.transport import Transport
+from flatland.suggestions import listed
 from flatland.timekeeper import NANOSECONDS
 
 _LOG = logging.getLogger("flatland")
@@ -20,6 +22,23 @@ _LOG = logging.getLogger("flatland")
 MAX_STAMP_AGE: Final = 0.1  # s
 """Maximum difference of wall time between the start of a step and the stamps of its messages."""
 _MAX_STAMP_AGE_NS: Final = round(MAX_STAMP_AGE * NANOSECONDS)
+
+
+def warn_of_other_clocks(topic: str, others: Sequence[str]) -> None:
+    """Logs a warning about other publishers of the time.
+
+    Args:
+        topic: The topic of the time.
+        others: Names of the other nodes.
+    """
+    _LOG.warning(
+        "%s is also published by %s: the time of all nodes that use it jumps; end this node or the "
+        "other one, leave %s out of a bag that is played, or set use_sim_time of one simulator to "
+        "false",
+        topic,
+        listed(others),
+        topic,
+    )
 
 
 class NodeClock:
@@ -51,12 +70,13 @@ class NodeClock:
 class SimulatedClock(NodeClock):
     """Publishes the simulated time on `/clock` and sets the ROS time of the node.
 
-    The topic exists, with the time 0, before a world is loaded. New subscribers receive the current
-    time at once, so that nodes which start while the world is loaded or paused have a valid time.
+    The topic exists before a world is loaded. New subscribers receive the current time at once, so
+    that nodes which start while the world is loaded or paused have a valid time. The simulated time
+    0 is published as `FIRST_TIME`.
     """
 
     def __init__(self, transport: Transport, rate: float = 0.0) -> None:
-        """Advertises the clock asynchronously and sets the ROS time to 0.
+        """Advertises the clock asynchronously and sets the ROS time to the first one.
 
         Args:
             transport: Publishes the topic.
@@ -69,9 +89,9 @@ class SimulatedClock(NodeClock):
         self._lock = threading.Lock()
         self._ticker = Ticker("flatland-clock", rate, self._run_now, self._tick) if rate else None
         self._topic = transport.clock_topic(
-            lambda: self._now_ns, self._run_now, self._connection_changed
+            lambda: clock_time(self._now_ns), self._run_now, self._connection_changed
         )
-        transport.set_time(0)
+        transport.set_time(clock_time(self._now_ns))
 
     def keep_time(self) -> None:
         """Makes the ROS time continue when the world is reset next.
@@ -101,7 +121,7 @@ class SimulatedClock(NodeClock):
     def time_advanced(self, time_ns: int) -> None:
         """Sets the ROS time, and publishes it unless the rate is limited."""
         self._now_ns = stamp(time_ns)
-        self._transport.set_time(self._now_ns)
+        self._transport.set_time(clock_time(self._now_ns))
         if self._ticker is None and self._topic.connected:
             self._topic.send()
 

@@ -20,6 +20,7 @@ from flatland.node.values import Diagnostics, Level, Status
 from flatland.plugin_api.plugin import describe
 from flatland.runtime.plugin_costs import PluginCosts
 from flatland.simulation import Simulation
+from flatland.suggestions import listed
 from flatland.timekeeper import NANOSECONDS
 from flatland.world import World
 
@@ -185,7 +186,7 @@ class _Costs:
         values = {**_largest(plugins), **_largest(types)}
         if disabled:
             values["disabled"] = ", ".join(disabled)
-            text = f"{len(disabled)} disabled after errors: {values['disabled']}"
+            text = f"{len(disabled)} disabled after errors: {listed(disabled)}"
             return Status("plugins", Level.ERROR, text, values)
         text = f"{sum(plugins.values()):.1f} % of the wall time" if elapsed else "no data"
         return Status("plugins", Level.OK, text, values)
@@ -206,7 +207,7 @@ class _Drops:
         }
         slow = [f"{topic} to {node}" for topic, node in sorted(dropped) if topic not in REPLACED]
         if slow:
-            text = f"subscribers do not keep up: {', '.join(slow)}"
+            text = f"subscribers do not keep up: {listed(slow)}"
             return Status("subscribers", Level.WARN, text, values)
         return Status("subscribers", Level.OK, "all keep up", values)
 

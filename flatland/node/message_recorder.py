@@ -6,6 +6,7 @@ import logging
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from flatland.node.stamps import clock_time
 from flatland.node.transport import Adapter
 from flatland.node.values import Transforms
 from flatland.plugin_api.ports import Output
@@ -16,8 +17,8 @@ from flatland.world import World
 _LOG = logging.getLogger("flatland")
 
 Write = Callable[[str, type[Any], bytes, int, int], None]
-"""Writes a message, given its topic, its class, its bytes, the simulated time [ns], and its number
-on the topic, from 0; messages of transforms have the number 0."""
+"""Writes a message, given its topic, its class, its bytes, its time on `/clock` [ns], and its
+number on the topic, from 0; messages of transforms have the number 0."""
 
 
 class MessageRecorder(WorldObserver):
@@ -131,7 +132,9 @@ class MessageRecorder(WorldObserver):
             if not self.error:
                 number = count
                 self._attempt(
-                    lambda: self._write_message(topic, message_type, data, time_ns, number)
+                    lambda: self._write_message(
+                        topic, message_type, data, clock_time(time_ns), number
+                    )
                 )
                 self.messages += not self.error
                 self.topics.add(topic)

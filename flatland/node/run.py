@@ -14,6 +14,7 @@ from flatland.errors import FlatlandError
 from flatland.node.fault_reports import FaultReports
 from flatland.node.parameters import ParameterError
 from flatland.node.shutdown import ShutdownWatchdog
+from flatland.streams import accept_any_text
 
 if TYPE_CHECKING:
     from flatland.node.clock import NodeClock
@@ -46,6 +47,7 @@ class NodeRun:
             is_fault_of_client: See `FaultReports`.
             unregister: See `ShutdownWatchdog`.
         """
+        accept_any_text()
         self.stopping = threading.Event()
         self.watchdog = ShutdownWatchdog(self._stop, unregister)
         self._simulation: Simulation | None = None

@@ -16,6 +16,7 @@ from flatland.plugin_api.ports import (
     OwnerFinder,
     SubscriberFault,
 )
+from flatland.suggestions import did_you_mean, listed
 
 T = TypeVar("T")
 
@@ -227,7 +228,8 @@ class PortRegistry:
             return self._outputs[global_name(topic)]
         except KeyError:
             raise WorldError(
-                f'output "{topic}" does not exist; existing outputs: {_names(self._outputs)}'
+                f'output "{topic}" does not exist; existing outputs: {_names(self._outputs)}',
+                hint=did_you_mean(global_name(topic), self._outputs),
             ) from None
 
     def find_command(self, topic: str) -> CommandTopic[Any]:
@@ -240,7 +242,8 @@ class PortRegistry:
             return CommandTopic(self._commands[global_name(topic)])
         except KeyError:
             raise WorldError(
-                f'command "{topic}" does not exist; existing commands: {_names(self._commands)}'
+                f'command "{topic}" does not exist; existing commands: {_names(self._commands)}',
+                hint=did_you_mean(global_name(topic), self._commands),
             ) from None
 
     def commands_of(self, owner: str) -> list[Command[Any]]:
@@ -262,7 +265,7 @@ class _KeptPorts:
 
 
 def _names(topics: Iterable[str]) -> str:
-    return ", ".join(sorted(topics)) or "none"
+    return listed(sorted(topics))
 
 
 def _check_type(port: Output[Any] | Command[Any], owner: str, value_type: type[Any]) -> None:

@@ -25,6 +25,7 @@ from flatland.plugins._people_crowd import create_crowd, read_bits
 from flatland.plugins._people_markers import MarkerSource, fields_of
 from flatland.plugins._people_models import BODY, LEGS, model_text, parties_of, preferred_speeds
 from flatland.plugins._people_places import PeoplePlaces
+from flatland.suggestions import listed
 from flatland.values import People, PeopleMarkers, PeopleStates, TrackedPeople
 
 if TYPE_CHECKING:
@@ -225,7 +226,7 @@ class Pedestrians(WorldPlugin):
         for group in self._groups:
             if name in (None, "", group.name):
                 return group
-        known = ", ".join(group.name for group in self._groups)
+        known = listed(group.name for group in self._groups)
         raise WorldError(f'group "{name}" does not exist; groups: {known}')
 
     def _find_people(self, names: list[str] | None) -> list[Model]:

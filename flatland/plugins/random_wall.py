@@ -10,6 +10,7 @@ from flatland.errors import PluginError, WorldError
 from flatland.geometry import IDENTITY, DoubleArray, Pose, compose, invert
 from flatland.plugin_api.parameters import at_key, read_finite
 from flatland.plugin_api.plugin import WorldPlugin
+from flatland.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from flatland.config.reader import YamlReader
@@ -60,12 +61,15 @@ class RandomWall(WorldPlugin):
 
     def _find_robot(self, name: str) -> Pose:
         """Returns the initial pose of a model of the world file, world frame."""
+        names = []
         for entry in self.world_config.optional_subnode("models", "list").items():
-            if entry.get("name", "string") == name:
+            names.append(entry.get("name", "string"))
+            if names[-1] == name:
                 pose: Pose = entry.get("pose", "pose", IDENTITY)
                 return pose
         raise PluginError(
-            f'robot "{name}" does not exist: no model of the world file has this name'
+            f'robot "{name}" does not exist: no model of the world file has this name',
+            hint=did_you_mean(name, names, "models of the world file"),
         )
 
     def _pick_edges(self, layer: Layer, count: int) -> DoubleArray:

@@ -14,7 +14,6 @@ from flatland.node.message_recorder import MessageRecorder
 from flatland.ros.adapters import convert, find_adapter
 
 _SEQUENCE: Final = struct.Struct("<I")
-_FIRST_TIME: Final = 1  # ns; rosbag play ignores messages at time 0
 _CHUNK_SIZE: Final = 256 * 1024  # bytes of an MCAP file; what is lost if the process is killed
 
 
@@ -53,8 +52,8 @@ def _recorder(
     """Creates a recorder.
 
     Args:
-        write: Writes a message, given its topic, the message, the simulated time [ns], and its
-            number on the topic.
+        write: Writes a message, given its topic, the message, its time [ns], and its number on
+            the topic.
         finish: Completes and closes the file.
         ends_on_error: See `MessageRecorder`.
     """
@@ -84,7 +83,7 @@ def record_bag(path: str | os.PathLike[str]) -> MessageRecorder:
     bag = bag_class(file, "w")
 
     def write(topic: str, message: Any, time_ns: int, _sequence: int) -> None:
-        bag.write(topic, message, convert.time(max(time_ns, _FIRST_TIME)))
+        bag.write(topic, message, convert.time(time_ns))
 
     def finish() -> None:
         with file:

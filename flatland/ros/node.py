@@ -23,6 +23,7 @@ from flatland.node.parameters import (
 from flatland.node.run import NodeRun
 from flatland.ros.message_types import select_package
 from flatland.ros.rospy_import import defer_catkin, shorten_registration
+from flatland.ros_addresses import connection_problem, master_address
 
 if TYPE_CHECKING:
     from flatland.ros.transport.registrar import Registrar
@@ -103,9 +104,11 @@ class ServerNode:
         except ValueError as error:
             _LOG.critical("%s (from ROS_MASTER_URI)", error)
             return 1
+        from flatland.ros.logs import log_to_ros, log_without_file
         from flatland.ros.transport import inbound
 
         inbound.install()
+        log_without_file()
         shorten_registration()
         try:
             # Without rostime, rospy does not subscribe to `/clock`; the bridge sets its time.
@@ -115,7 +118,6 @@ class ServerNode:
                 return 0
             logging.getLogger("rosout").critical("%s", error)
             return 1
-        from flatland.ros.logs import log_to_ros
 
         def shut_down(reason: str) -> None:
             self._replaced |= _REPLACED in reason
@@ -145,11 +147,16 @@ class ServerNode:
         """
         import rosgraph
 
+        uri = rosgraph.get_master_uri()
+        host, port = master_address(uri)
         found: Future[None] = Future()
+        reason = "there is no response"
 
         def search() -> None:
+            nonlocal reason
             try:
                 while not rosgraph.is_master_online():
+                    reason = connection_problem(host, port) or "it is no ROS master"
                     time.sleep(_MASTER_POLL_PERIOD)
                 found.set_result(None)
             except Exception as error:
@@ -165,7 +172,7 @@ class ServerNode:
                 return True
             if time.monotonic() > warning_due:
                 # To standard error, because rospy logs nothing without a master.
-                _LOG.warning("waiting for the ROS master at %s", rosgraph.get_master_uri())
+                _LOG.warning("waiting for the ROS master at %s (%s)", uri, reason)
                 warning_due = math.inf
         return False
 
@@ -211,8 +218,11 @@ class ServerNode:
         # Other nodes have a valid time while the world is loaded.
         self._registrar.flush(_REGISTRATION_TIMEOUT)
         from flatland.ros.transport.master_watch import MasterWatch
+        from flatland.ros.transport.network_check import NetworkCheck
 
-        with closing(MasterWatch(self._registrar, self._replace)) as master_watch:
+        check_network = NetworkCheck(publishes_clock=parameters.use_sim_time)
+        watch = MasterWatch(self._registrar, self._replace, check_network)
+        with closing(watch) as master_watch:
             # Closed before the topics, so that no topic is registered again.
             self._run.serve(parameters, transport, clock, ended=master_watch.close)
 

@@ -197,6 +197,7 @@ class _SharedPublisher(Shared):
         self._profile = profile
         self._lock = threading.RLock()  # of the publisher and the number of its subscribers
         self._has_sent = False
+        self._refused: set[str] = set()  # texts that were logged
         self._publisher: Any = None
 
     def open(self) -> None:
@@ -209,7 +210,9 @@ class _SharedPublisher(Shared):
             self.type,
             self._topic,
             self._profile,
-            event_callbacks=PublisherEventCallbacks(matched=self._matched),
+            event_callbacks=PublisherEventCallbacks(
+                matched=self._matched, incompatible_qos=self._incompatible
+            ),
         )
 
     def publish(self, message: Any) -> None:
@@ -243,6 +246,14 @@ class _SharedPublisher(Shared):
             users = list(self.users)
         for user in users:
             user.update(connected=info.current_count > 0, new=info.current_count_change > 0)
+
+    def _incompatible(self, _info: Any) -> None:
+        """Logs subscribers that receive nothing; called by the executor."""
+        topic = self.key[1]
+        for text in qos.refused(self._node.get_subscriptions_info_by_topic(topic), self._profile):
+            if text not in self._refused:
+                self._refused.add(text)
+                _LOG.warning('topic "%s": %s', topic, text)
 
 
 class Publisher(User):

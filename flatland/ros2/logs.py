@@ -6,6 +6,8 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
+from flatland.node.names import sendable_text
+
 
 class _ToRcutils(logging.Handler):
     """Forwards records to a logger of rclpy."""
@@ -23,7 +25,7 @@ class _ToRcutils(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         try:
-            text = self.format(record)
+            text = sendable_text(self.format(record))
             next(log for level, log in self._functions if record.levelno >= level)(text)
         except Exception:
             self.handleError(record)

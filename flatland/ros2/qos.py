@@ -58,6 +58,34 @@ def of_publisher(
     return QoSProfile(depth=depth)
 
 
+def refused(subscribers: Sequence[TopicEndpointInfo], offered: QoSProfile) -> list[str]:
+    """Returns a text for each subscriber that requires more than a publisher offers.
+
+    Args:
+        subscribers: The subscribers of the topic.
+        offered: Quality of service of the publisher.
+    """
+    texts = []
+    for each in subscribers:
+        name = f"{each.node_namespace.rstrip('/')}/{each.node_name}"
+        wanted = each.qos_profile
+        receives_nothing = f"{name} receives nothing, because it requires"
+        if (
+            wanted.reliability == ReliabilityPolicy.RELIABLE
+            and offered.reliability == ReliabilityPolicy.BEST_EFFORT
+        ):
+            remedy = "let it subscribe with best effort (the profile of sensor data)"
+            if offered is not CLOCK:
+                remedy += ", or start the simulator with reliable_sensors:=true"
+            texts.append(f"{receives_nothing} reliable messages: {remedy}")
+        if (
+            wanted.durability == DurabilityPolicy.TRANSIENT_LOCAL
+            and offered.durability == DurabilityPolicy.VOLATILE
+        ):
+            texts.append(f"{receives_nothing} stored messages: let it subscribe as volatile")
+    return texts
+
+
 def of_viewer(publishers: Sequence[TopicEndpointInfo]) -> QoSProfile:
     """Returns the quality of service of a subscription that all present publishers satisfy.
 

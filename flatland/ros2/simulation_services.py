@@ -40,6 +40,8 @@ from flatland.node.transport import CallError
 from flatland.node.values import WORLD_FRAME
 from flatland.plugin_api.plugin import describe
 from flatland.plugins.pedestrians import Pedestrians
+from flatland.ros2.endpoints import destroy_later
+from flatland.suggestions import did_you_mean
 from flatland.timekeeper import NANOSECONDS
 
 if TYPE_CHECKING:
@@ -81,6 +83,7 @@ class SimulationServices:
         Raises:
             FlatlandError: A plugin has a service of the same name.
         """
+        self._node = node
         self._served = served
         self._world = served.world
         self._services = served.services
@@ -102,6 +105,7 @@ class SimulationServices:
             "reset_simulation": self._reset_simulation,
             "step_simulation": self._step_simulation,
         }
+        self._closed = False
         self._connections = []
         for name, call in calls.items():
             service_type = getattr(types, "".join(map(str.capitalize, name.split("_"))))
@@ -119,9 +123,10 @@ class SimulationServices:
 
     def close(self) -> None:
         """Ends the services and the action."""
+        self._closed = True
         for connection in self._connections:
             connection.close()
-        self._action.destroy()
+        destroy_later(self._node, lambda action: action.destroy(), self._action)
 
     def _respond(
         self, service_type: type[Any], call: Callable[[Any, Any], str | None], request: Any
@@ -149,7 +154,9 @@ class SimulationServices:
         for model in self._world.models:
             if model.name == name:
                 return model
-        raise RefusedError(messages.Result.RESULT_NOT_FOUND, f'there is no entity "{name}"')
+        hint = did_you_mean(name, (model.name for model in self._world.models), "entities")
+        text = f'there is no entity "{name}" (hint: {hint})'
+        raise RefusedError(messages.Result.RESULT_NOT_FOUND, text)
 
     # -- the simulator ---------------------------------------------------------------------
 
@@ -277,8 +284,13 @@ class SimulationServices:
         ).start()
 
     def _carry_out_goal(self, goal: Any, execute: Callable[[Any], Any]) -> None:
-        with suppress(StopIteration):  # the end of a coroutine that never waits
-            self._action._execute_goal(execute, goal).send(None)
+        try:
+            with suppress(StopIteration):  # the end of a coroutine that never waits
+                self._action._execute_goal(execute, goal).send(None)
+        except Exception:
+            if not self._closed:
+                raise
+            # The action has ended, and there is no client of the result.
 
     def _simulate_steps(self, goal: Any) -> Any:
         """Carries out the goal of the action and returns its result."""

@@ -10,11 +10,13 @@ from contextlib import AbstractContextManager
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
+from rclpy.clock import Clock as NodeTime
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
+from flatland.node.clock import warn_of_other_clocks
 from flatland.node.ticker import Ticker
 from flatland.node.transport import MARKERS, Adapter, OnConnection, Transport
 from flatland.ros2 import qos, ros_time
@@ -23,6 +25,7 @@ from flatland.ros2.endpoints import (
     Publisher,
     StateTopic,
     Subscription,
+    destroy_later,
     resolve_topic,
 )
 from flatland.ros2.message_types import message_class, service_class
@@ -39,6 +42,7 @@ if TYPE_CHECKING:
     from flatland.world import World
 
 _CLOCK: Final = "/clock"
+_CLOCK_CHECK_PERIOD: Final = 2.0  # s of wall time between two searches for other publishers
 _CLOCK_REPETITIONS: Final = 5.0  # s of wall time after a new subscriber
 _CLOCK_REPETITION_RATE: Final = 10.0  # Hz
 
@@ -243,6 +247,11 @@ class ClockTopic(StateTopic):
         super().__init__(
             endpoints, _CLOCK, Clock, self._message, post, on_connection, profile=qos.CLOCK
         )
+        self._node = endpoints.node
+        self._known: set[str] = set()  # other publishers
+        self._check = self._node.create_timer(
+            _CLOCK_CHECK_PERIOD, self._find_others, clock=NodeTime(clock_type=ClockType.STEADY_TIME)
+        )
 
     def send(self) -> None:
         """Publishes the current time; of several threads, none sends an earlier one."""
@@ -259,7 +268,22 @@ class ClockTopic(StateTopic):
     def close(self) -> None:
         """Ends the topic."""
         self._repetition.close()
+        destroy_later(self._node, self._node.destroy_timer, self._check)
         super().close()
+
+    def _find_others(self) -> None:
+        """Logs a warning about other publishers of the time; called by the executor."""
+        own = self._node.get_fully_qualified_name()
+        names = [
+            f"{each.node_namespace.rstrip('/')}/{each.node_name}"
+            for each in self._node.get_publishers_info_by_topic(self.topic)
+        ]
+        if own in names:
+            names.remove(own)  # Several nodes may have one name.
+        others = set(names) - self._known
+        if others:
+            self._known |= others
+            warn_of_other_clocks(self.topic, sorted(others))
 
     def _message(self) -> bytes:
         to = CdrWriter()

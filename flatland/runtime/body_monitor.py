@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, Literal, get_args
 from flatland.entities.model import Model
 from flatland.errors import WorldError
 from flatland.runtime.observer import WorldObserver
+from flatland.suggestions import MOST_NAMES
 
 if TYPE_CHECKING:
     from flatland.entities.body import Body
@@ -139,5 +140,7 @@ class BodyMonitor(WorldObserver):
                 names.append(f"body {body_id}, which belongs to no model,")
             else:
                 names.append(f'body "{body.name}" of model "{body.entity.name}"')
+        if len(names) > MOST_NAMES:
+            names[MOST_NAMES:] = [f"{len(names) - MOST_NAMES} more"]
         verb = "has" if len(names) == 1 else "have each"
         return f"{' and '.join(names)} {verb} a pose or velocity that is not finite"

@@ -10,6 +10,7 @@ from flatland.checks import plain_path
 from flatland.entities.layer import Layer
 from flatland.errors import WorldError
 from flatland.maps.map_file import LayerMap
+from flatland.suggestions import did_you_mean
 from flatland.values import OccupancyGrid
 
 if TYPE_CHECKING:
@@ -77,7 +78,10 @@ class LayerSet:
         for layer in self.all:
             if name in layer.names:
                 return layer
-        raise WorldError(f'layer with name "{name}" does not exist')
+        hint = did_you_mean(
+            name, (each for layer in self.all for each in layer.names), "layers of the world"
+        )
+        raise WorldError(f'layer with name "{name}" does not exist', hint=hint)
 
     def add(self, layer: Layer) -> None:
         """Adds a layer whose names are registered."""

@@ -22,6 +22,7 @@ from flatland.runtime.appearance import (
     set_layers,
 )
 from flatland.runtime.placement import check_if_blocked
+from flatland.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from flatland.entities.collision_filter import CollisionFilter
@@ -102,7 +103,11 @@ class ModelSet:
         try:
             return self.by_name[name]
         except (KeyError, TypeError):
-            raise WorldError(f"model with name {quoted(name)} does not exist") from None
+            similar = ""
+            if self.by_name and isinstance(name, str):
+                similar = did_you_mean(name, self.by_name, "models of the world")
+            text = f"model with name {quoted(name)} does not exist"
+            raise WorldError(text, hint=similar) from None
 
     # -- requests --------------------------------------------------------------------------
 
@@ -480,7 +485,7 @@ class ModelSet:
         try:
             return self.find(name)
         except WorldError as error:
-            raise WorldError(f"failed to {verb} model, {error.message}") from None
+            raise WorldError(f"failed to {verb} model, {error.message}", hint=error.hint) from None
 
     def _place(self, model: Model, pose: Pose, if_blocked: IfBlocked, verb: str) -> None:
         """Puts a model at a pose, or at another one if that is blocked."""

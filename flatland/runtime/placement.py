@@ -36,6 +36,7 @@ from flatland.geometry import (
 )
 from flatland.runtime.free_space import FreeSpace, Spread
 from flatland.runtime.nearest_place import SEARCH_RADIUS, nearest_offset
+from flatland.suggestions import did_you_mean, listed
 
 if TYPE_CHECKING:
     from flatland.entities.collision_filter import CollisionFilter
@@ -165,7 +166,7 @@ class Placement:
             else:
                 kind = "layer" if isinstance(body.entity, Layer) else "model"
                 names.append(f'{kind} "{body.entity.name}"')
-        return ", ".join(dict.fromkeys(names))
+        return listed(dict.fromkeys(names))
 
     # -- free places -----------------------------------------------------------------------
 
@@ -270,7 +271,8 @@ class Placement:
         names = checked_names("layers", layers)
         unknown = self._collision_filter.unknown(names)
         if unknown:
-            raise WorldError(f'layer with name "{unknown[0]}" does not exist')
+            hint = did_you_mean(unknown[0], self._collision_filter.names, "layers of the world")
+            raise WorldError(f'layer with name "{unknown[0]}" does not exist', hint=hint)
         return self._collision_filter.category_bits(names)
 
     def _bodies(self, models: Models) -> list[PhysicsBody]:

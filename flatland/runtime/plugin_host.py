@@ -189,7 +189,8 @@ class PluginHost:
             if isinstance(error, YamlError):  # which names a place of its own
                 position = error.place or entry.place
                 raise PluginError(text, place=position, hint=error.hint) from error
-            raise PluginError(text + entry.place.suffix, place=entry.place) from error
+            hint = error.hint if isinstance(error, FlatlandError) else ""
+            raise PluginError(text + entry.place.suffix, place=entry.place, hint=hint) from error
         except BaseException:
             self._abandon(plugin)
             raise

@@ -6,6 +6,7 @@ import os
 import threading
 from typing import TYPE_CHECKING, Any, Final
 
+from flatland.ros.logs import log_without_file
 from flatland.ros.transport import inbound
 from flatland.ros.transport.registrar import Registrar
 from flatland.ros.transport.ros_transport import RosTransport
@@ -49,6 +50,7 @@ class Ros1:
         master.start()
         self.environment["ROS_MASTER_URI"] = os.environ["ROS_MASTER_URI"] = master.uri
         inbound.install()
+        log_without_file()
         rospy.init_node(_NODE, argv=[], disable_signals=True, disable_rostime=True)
         rospy.set_param("/use_sim_time", True)
         self._registrar = Registrar()

@@ -23,6 +23,7 @@ from flatland.geometry import DoubleArray, Pose
 from flatland.maps.grey_image import GreyImage, read_grey_image
 from flatland.maps.map_image import threshold_in_place
 from flatland.output_files import replaced
+from flatland.streams import accept_any_text
 from flatland.tools.wall_segments import find_wall_segments
 
 IMAGE_SCALES = {"low": 1.05, "med": 1.5, "high": 2.0}
@@ -180,6 +181,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         Exit code: 0, or 1 after an error, which is printed to the standard error.
     """
+    accept_any_text()
     parser = argparse.ArgumentParser(prog="map_to_lines.py", description=__doc__)
     parser.add_argument("map", metavar="MAP_YAML", help="map file of map_server")
     parser.add_argument("folder", metavar="OUTPUT_DIR", type=Path, help="output folder")

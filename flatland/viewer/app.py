@@ -12,6 +12,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from flatland.ros.rospy_import import defer_catkin
+from flatland.ros_addresses import master_address
+from flatland.streams import accept_any_text
 from flatland.viewer.restarts import STOP_SIGNALS, run_with_restarts, stop_signals_blocked
 
 if TYPE_CHECKING:
@@ -36,25 +38,28 @@ def main() -> int:
 
 
 def _run(disable_restarts: Callable[[], None], is_last_start: bool) -> int:
+    accept_any_text()
     defer_catkin()
     import rosgraph
     import rospy
 
     try:
+        uri = rosgraph.get_master_uri()
+        master_address(uri)
         online = rosgraph.is_master_online()
     except ValueError as error:
         print(f"flatland_viz: {error} (from ROS_MASTER_URI)", file=sys.stderr)
         return 1
     if not online:
         # rospy.init_node would wait for the master without showing a window or a message.
-        uri = rosgraph.get_master_uri()
         print(f"flatland_viz: no ROS master at {uri}: start the simulator first", file=sys.stderr)
         return 1
+    from flatland.ros.logs import log_to_ros, log_without_file
+
+    log_without_file()
     with stop_signals_blocked():
         # Anonymous, so that several viewers can run. RViz reads the simulated time, rospy does not.
         rospy.init_node(NODE_NAME, anonymous=True, disable_signals=True, disable_rostime=True)
-    from flatland.ros.logs import log_to_ros
-
     log_to_ros()
     error_text = _startup_error()
     if error_text:

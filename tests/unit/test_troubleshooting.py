@@ -22,6 +22,7 @@ from programs import run_program
 
 import flatland
 from flatland.node.parameters import ParameterError, read_parameters
+from flatland.ros_addresses import master_address
 
 WORLD = "properties: {}\nlayers: []\nmodels: [{name: r1, model: robot.yaml}]\n"
 BODY = "bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]\n"
@@ -99,6 +100,12 @@ def white_image(case: Case) -> str:
     return missing_image(case)
 
 
+def invalid_master(_case: Case) -> str:
+    with pytest.raises(ValueError, match="no port") as caught:
+        master_address("http://localhost")
+    return str(caught.value)
+
+
 def stuck(case: Case) -> str:
     """The robot is driven into a corridor that is narrower than itself."""
     case.write(map_yaml=MAP, walls_dat="0 0.19 9 0.19\n0 -0.19 9 -0.19\n")
@@ -146,6 +153,7 @@ TF = "{name: tf, type: ModelTfPublisher, publish_tf_world: true}"
 PROVOKED: dict[str, Callable[[Case], str]] = {
     "`setup.bash` fails": not_set_up,
     "The node ends immediately: a parameter is invalid": invalid_parameter,
+    "The address of the ROS master is invalid": invalid_master,
     "A key is not recognized": lambda case: case.load(
         robot=BODY + "plugins: [{name: drive, type: DiffDrive, body: base, pub_rat: 5}]"
     ),
@@ -196,6 +204,9 @@ WRITTEN_IN = {
     "`make run WORLD=…` does not find the world": "tools/run.sh",
     "The node ends immediately: no world": "flatland/node/parameters.py",
     "The node does not start": "flatland/ros/node.py",
+    "Other nodes receive nothing from the simulator": "flatland/ros/transport/network_check.py",
+    "No log file is written": "flatland/ros/logs.py",
+    "The time of other nodes jumps": "flatland/node/clock.py",
     "Other nodes show wall time, or discard transforms as too old": "flatland/ros/node.py",
     "A plugin takes too long to start": "flatland/runtime/plugin_host.py",
     "A topic of a plugin does not exist in ROS": "flatland/node/bridge.py",

@@ -14,6 +14,8 @@ from flatland.node.parameters import ParameterError, TeleopParameters, read_tabl
 from flatland.ros.rospy_import import defer_catkin
 from flatland.ros.teleop.held_key import HeldKey, decode
 from flatland.ros.teleop.terminal import KeyInput, StopRequests
+from flatland.ros_addresses import master_address
+from flatland.streams import accept_any_text
 
 if TYPE_CHECKING:
     from flatland.ros.transport.publisher import Publisher
@@ -42,6 +44,7 @@ def main() -> int:
     Returns:
         The exit code: 0 after a requested stop, 1 if the node cannot start.
     """
+    accept_any_text()
     if not sys.stdin.isatty():
         return _fail(
             "the standard input is not a terminal: start it in a terminal, by "
@@ -52,15 +55,17 @@ def main() -> int:
     import rospy
 
     try:
+        uri = rosgraph.get_master_uri()
+        master_address(uri)
         if not rosgraph.is_master_online():
-            uri = rosgraph.get_master_uri()
             return _fail(f"no ROS master at {uri}: start the simulator first")
     except ValueError as error:
         return _fail(f"{error} (from ROS_MASTER_URI)")
     # Without ROS time, so that it also works while the simulated time stands still.
-    rospy.init_node(NODE_NAME, anonymous=True, disable_signals=True, disable_rostime=True)
-    from flatland.ros.logs import log_to_ros
+    from flatland.ros.logs import log_to_ros, log_without_file
 
+    log_without_file()
+    rospy.init_node(NODE_NAME, anonymous=True, disable_signals=True, disable_rostime=True)
     log_to_ros()
     try:
         parameters = read_table(TeleopParameters, lambda name: rospy.get_param(f"~{name}", None))

@@ -6,6 +6,7 @@ existing connections still work.
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import logging
 import threading
@@ -38,15 +39,22 @@ class MasterWatch:
     in order with all other registrations.
     """
 
-    def __init__(self, registrar: Registrar, on_replaced: Callable[[], object]) -> None:
+    def __init__(
+        self,
+        registrar: Registrar,
+        on_replaced: Callable[[], object],
+        check_network: Callable[[], None] = lambda: None,
+    ) -> None:
         """Starts the thread; must be called after `rospy.init_node`.
 
         Args:
             registrar: Makes the calls to the master.
             on_replaced: Called once if another node has the name of this node.
+            check_network: Called after each successful poll, in the thread.
         """
         self._registrar = registrar
         self._on_replaced = on_replaced
+        self._check_network = check_network
         self._uri: str = rosgraph.get_master_uri()
         self._pid: int | None = None  # of the master, None before the first response
         self._registering = 0  # registrations of the whole node that are not complete
@@ -81,6 +89,9 @@ class MasterWatch:
             if is_new or (not node_uri and not self._registering):
                 self._registering += 1
                 self._registrar.submit(self._register)
+            # Without a response, which the next poll finds out, the check is made later.
+            with contextlib.suppress(OSError, http.client.HTTPException):
+                self._check_network()
 
     def _ask(self) -> tuple[int, str]:
         """Returns the process of the master, and the URI of the node, empty if it is unknown."""

@@ -3,15 +3,48 @@
 from __future__ import annotations
 
 import importlib
+import logging
 from collections.abc import Callable
 from typing import Any
 
 import rospy
+from rospy.exceptions import TransportTerminated
 
 from flatland.node.parameters import OWN_PACKAGE
 from flatland.node.transport import CallError
 from flatland.ros.message_types import service_class, with_arrays
 from flatland.ros.transport.registrar import Registrar
+
+_LOG = logging.getLogger("flatland")
+
+
+class _Provider(rospy.Service):  # type: ignore[misc]
+    """A service of rospy that logs no error about a client that closes its connection.
+
+    Programs that only find out whether a service exists close it before their request, and a client
+    that is ended before the response.
+    """
+
+    def handle(self, transport: Any, header: dict[str, str]) -> None:
+        """Handles the requests of a connection; called by rospy in a thread of its own."""
+        is_persistent = header.get("persistent", "").lower() in ("1", "true")
+        try:
+            while header.get("probe") != "1":
+                for request in transport.receive_once():
+                    self._handle_request(transport, request)
+                if not is_persistent:
+                    return
+        except TransportTerminated as error:
+            _LOG.debug("a client of %s has closed its connection: %s", self.resolved_name, error)
+        finally:
+            transport.close()
+
+    def error_handler(
+        self, error: Exception, kind: type[Exception], value: Exception, traceback: Any
+    ) -> None:
+        """Logs an exception of the handler, unless the client has ended; called by rospy."""
+        if not isinstance(error, TransportTerminated):
+            super().error_handler(error, kind, value, traceback)
 
 
 class Service:
@@ -75,7 +108,7 @@ class Service:
 
     def _open(self) -> None:
         if not self._closed:
-            self._service = rospy.Service(self.name, self._service_type, self._handle)
+            self._service = _Provider(self.name, self._service_type, self._handle)
 
     def _end(self) -> None:
         if self._service is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import resource
 import socket
+import struct
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -94,6 +95,7 @@ class Node:
         assert ServerProxy(self.uri).getPid("/test") == [1, "", self.pid]
         assert self.process.running
         assert "Traceback" not in self.process.output
+        assert "[ERROR]" not in self.process.output
 
 
 @pytest.fixture(scope="module")
@@ -264,6 +266,26 @@ def test_rubbish_request_of_a_service(
     assert is_closed(connections[0])
     if data == EMPTY_REQUEST:
         node.process.wait_for_line(r"\[WARN\].*closed the connection of a client: ")
+    node.assert_serves()
+
+
+@pytest.mark.parametrize("is_reset", [False, True])
+@pytest.mark.parametrize("data", [b"", b"\x0a", b"\x0a\x00\x00\x00\x06\x00\x00\x00no"])
+def test_a_client_that_ends_within_its_call_is_no_error(
+    node: Node, data: bytes, is_reset: bool
+) -> None:
+    """As programs that only find out whether a service exists."""
+    connection = tcpros.connect(node.tcpros)
+    fields = {"callerid": "/brief", "service": "/delete_model", "md5sum": "*"}
+    connection.sendall(tcpros.header(fields))
+    tcpros.read_frame(connection)
+    connection.sendall(data)
+    if is_reset:
+        linger = struct.pack("ii", 1, 0)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+    before = node.settled()
+    connection.close()
+    wait_until("the end of the thread", lambda: node.status("Threads") < before[1])
     node.assert_serves()
 
 

@@ -120,8 +120,29 @@ def test_a_display_that_does_not_answer(monkeypatch):
 def test_the_ros_master(monkeypatch):
     monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
     assert doctor._check_master().detail.startswith("not running at http://localhost:1 (")
-    monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:notaport")
-    assert doctor._check_master().status == "info"
+    for uri in ("http://localhost:notaport", "http://localhost", "localhost:11311"):
+        monkeypatch.setenv("ROS_MASTER_URI", uri)
+        found = doctor._check_master()
+        assert (found.status, found.remedy) == ("info", "set ROS_MASTER_URI")
+        assert found.detail.startswith(f'invalid master URI "{uri}": ')
+
+
+def test_an_address_that_no_node_can_be_reached_at(monkeypatch):
+    monkeypatch.delenv("ROS_HOSTNAME", raising=False)
+    monkeypatch.delenv("ROS_MASTER_URI", raising=False)
+    monkeypatch.setenv("ROS_IP", "127.0.0.1")
+    assert doctor._check_own_address().status == "ok"
+    monkeypatch.setenv("ROS_MASTER_URI", "http://192.0.2.1:11311")
+    found = doctor._check_own_address()
+    assert found.status == "absent"
+    assert "the master is on 192.0.2.1" in found.detail
+    monkeypatch.setenv("ROS_IP", "no-such-host.invalid")
+    found = doctor._check_own_address()
+    assert found.status == "absent"
+    assert found.detail.startswith(
+        'no program can connect to "no-such-host.invalid", from ROS_IP: '
+    )
+    assert "ROS_IP" in found.remedy
 
 
 def test_packages_are_those_of_the_list(checkout: Path):

@@ -11,6 +11,7 @@ import pytest
 from waiting import TIMEOUT, wait_until
 
 from flatland.node.clock import NodeClock, SimulatedClock, WallClock, stamp
+from flatland.node.stamps import FIRST_TIME
 
 START = 1_700_000_000_000_000_000  # ns
 STEP = 5_000_000  # ns
@@ -159,6 +160,30 @@ def test_the_simulated_time_is_published_with_each_step(transport: Any) -> None:
     assert topic.closed
 
 
+@pytest.mark.parametrize("rate", [0.0, 1000.0])
+def test_the_time_is_never_0(transport: Any, rate: float) -> None:
+    """ROS takes 0 for no time."""
+    clock = SimulatedClock(transport, rate)
+    topic = transport.topics["/clock"]
+    assert transport.time_ns == FIRST_TIME == 1
+    topic.connect()
+    for time_ns in (STEP, 0, 1, STEP):  # 0 after a reset
+        clock.time_advanced(time_ns)
+        clock.flush()
+        assert topic.sent[-1] == transport.time_ns == max(time_ns, FIRST_TIME)
+        assert stamp(0) == 0
+    assert 0 not in topic.sent
+    clock.close()
+
+
+def test_a_reset_that_keeps_the_first_time_does_not_shift_stamps(transport: Any) -> None:
+    clock = SimulatedClock(transport)
+    clock.keep_time()
+    clock.time_advanced(STEP)
+    assert (transport.time_ns, stamp(STEP)) == (STEP, STEP)
+    clock.close()
+
+
 def test_the_ros_time_may_continue_when_the_simulated_time_starts_again(transport: Any) -> None:
     clock = SimulatedClock(transport)
     topic = transport.topics["/clock"]
@@ -181,11 +206,11 @@ def test_with_a_limited_rate_a_time_is_published_once(transport: Any) -> None:
     wait_until("the first tick", lambda: len(topic.sent) == 2)
     for number in range(1, 4):
         clock.time_advanced(number * STEP)
-    assert topic.sent == [0, 0]
+    assert topic.sent == [FIRST_TIME, FIRST_TIME]
     assert transport.time_ns == 3 * STEP
     clock.flush()
     clock.flush()
-    assert topic.sent == [0, 0, 3 * STEP]
+    assert topic.sent == [FIRST_TIME, FIRST_TIME, 3 * STEP]
     assert (clock.watches_steps, clock.watches_time) == (False, True)
     threads = [each for each in threading.enumerate() if each.name == "flatland-clock"]
     assert threads

@@ -10,6 +10,7 @@ import pytest
 
 import flatland
 from flatland.node.message_recorder import MessageRecorder
+from flatland.node.stamps import FIRST_TIME
 from flatland.node.transport import Adapter
 from flatland.node.values import Transforms
 
@@ -92,7 +93,7 @@ def test_outputs_and_transforms_are_recorded_at_their_times(file: File, load: An
     recorder = file.recorder()
     world = load(recorder)
     world.step(4)
-    assert file.of("/scan") == [(0, 0), (2 * STEP_NS, 1)]
+    assert file.of("/scan") == [(FIRST_TIME, 0), (2 * STEP_NS, 1)]
     assert [kind for topic, kind, *_ in file.written if topic == "/scan"] == [
         flatland.LaserScan
     ] * 2
@@ -103,7 +104,7 @@ def test_outputs_and_transforms_are_recorded_at_their_times(file: File, load: An
         if topic == "/tf":
             assert kind is Transforms
             assert isinstance(value, Transforms)
-            assert (time_ns, number) == (max(each.stamp for each in value), 0)
+            assert (time_ns, number) == (max(FIRST_TIME, *(each.stamp for each in value)), 0)
     assert recorder.topics == {topic for topic, *_ in file.written}
     assert recorder.messages == len(file.written)
     for _ in range(2):

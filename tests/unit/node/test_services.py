@@ -147,6 +147,23 @@ def test_models_are_spawned_moved_and_deleted(node: Any) -> None:
     assert node.transport.flushed == [REGISTRATION_TIMEOUT]
 
 
+def test_similar_models_are_hints(node: Any) -> None:
+    spawn(node, "cart1", 1.0)
+    spawn(node, "cart2", 2.0)
+    missing = 'model with name "cart" does not exist'
+    for call, fields, start in (
+        ("delete_model", {"name": "cart"}, "failed to delete model, "),
+        ("delete_models", {"names": ["cart1", "cart"]}, "names[1]: failed to delete model, "),
+        ("move_model", {"name": "cart", "pose": pose(0.0, 0.0, 0.0)}, "failed to move model, "),
+        ("get_model_states", {"names": ["cart"]}, ""),
+    ):
+        answer = node.call(call, **fields)
+        assert answer.success is False
+        assert answer.message == (
+            f'Flatland World: {start}{missing} (hint: did you mean "cart1" or "cart2"?)'
+        )
+
+
 def test_appearances_are_changed(node: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     spawn(node, "a")
     (body,) = node.world.model("a").bodies

@@ -141,7 +141,7 @@ INVALID = "color must be [r, g, b] or [r, g, b, a], each from 0 to 1, got "
 @pytest.mark.parametrize(
     ("arguments", "text", "hint"),
     [
-        ({"model": "bx"}, 'model, model with name "bx" does not exist', ""),
+        ({"model": "bx"}, 'model, model with name "bx" does not exist', 'did you mean "box"?'),
         ({"body": "lit"}, 'body with name "lit" does not exist', 'did you mean "lid"?'),
         ({"body": "7"}, 'body with name "7" does not exist', "bodies of the model: base, lid"),
         ({"layers": ["low", "lower"]}, "{lower} layer(s) does not exist", 'did you mean "low"?'),

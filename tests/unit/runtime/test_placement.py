@@ -232,6 +232,19 @@ def test_a_refused_request_of_a_hook_logs_one_error(
     assert ["failed to move" in line for line in warnings_of(caplog)] == [True]
 
 
+def test_five_overlapped_models_are_named_and_the_others_counted(
+    files: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    models = ", ".join(f"{{name: m{number}, model: minimal.model.yaml}}" for number in range(40))
+    world = files.load(f"properties: {{}}\nlayers: []\nmodels: [{models}]\n")
+    texts = warnings_of(caplog)
+    assert len(texts) == 39
+    assert max(map(len, texts)) < 200
+    named = ", ".join(f'model "m{number}"' for number in range(5))
+    assert texts[-1].endswith(f"overlaps {named} and 34 more at (0.000, 0.000, 0.000)")
+    assert " and 34 more at " in world.describe_overlap("m0")
+
+
 def test_each_overlapping_model_of_a_world_file_is_logged_once(
     world: flatland.World, files: Any, caplog: pytest.LogCaptureFixture
 ) -> None:

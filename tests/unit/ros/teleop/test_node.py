@@ -282,7 +282,11 @@ def test_an_invalid_parameter_ends_the_program(
             "http://127.0.0.1:1",
             "no ROS master at http://127.0.0.1:1: start the simulator first",
         ),
-        ("nonsense", "invalid master URI: nonsense (from ROS_MASTER_URI)"),
+        (
+            "nonsense",
+            'invalid master URI "nonsense": it does not start with http://, expected '
+            "http://HOST:PORT, such as http://localhost:11311 (from ROS_MASTER_URI)",
+        ),
     ],
 )
 def test_the_program_needs_a_master(
