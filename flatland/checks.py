@@ -47,14 +47,16 @@ def checked_count(name: str, value: object, least: int = 1, most: int | None = N
     Raises:
         ValueError: It is no integer, too small or too large.
     """
+    limits = f"of at least {least}"
     if isinstance(value, SupportsIndex) and not isinstance(value, bool | np.bool_):
         try:
             number = operator.index(value)
         except TypeError:  # an array with several numbers
             number = least - 1
-        if number >= least and (most is None or number <= most):
-            return number
-    limits = f"of at least {least}" if most is None else f"from {least} to {most}"
+        if number >= least:
+            if most is None or number <= most:
+                return number
+            limits = f"from {least} to {most}"
     raise ValueError(f"{name} must be an integer {limits}, got {shown(value)}")
 
 
@@ -90,6 +92,14 @@ def checked_number(name: str, value: object, unit: str = "") -> float:
         return plain_number(value)
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be a number{_in(unit)}, got {shown(value)}") from None
+
+
+def checked_finite(name: str, value: object, unit: str = "") -> float:
+    """Returns a finite number as a float; see `checked_number`."""
+    number = checked_number(name, value, unit)
+    if not math.isfinite(number):
+        raise ValueError(f"{name} must be finite{_in(unit)}, got {shown(value)}")
+    return number
 
 
 def checked_range(name: str, value: object, least: float, most: float, unit: str = "") -> float:

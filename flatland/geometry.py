@@ -62,18 +62,22 @@ def wrap_angle(theta: float) -> float:
     return math.remainder(theta, math.tau)
 
 
-def finite_pose(pose: Sequence[float]) -> Pose:
+def finite_pose(pose: Sequence[float], name: str = "pose") -> Pose:
     """Converts a sequence of three numbers to a pose.
+
+    Args:
+        pose: The numbers.
+        name: Name of the pose, for the error.
 
     Raises:
         ValueError: The sequence does not consist of three numbers, or one is NaN or infinite.
     """
     numbers = plain_numbers(pose, (3,))
     if numbers is None:
-        raise ValueError(f"pose must be three numbers (x, y, theta), got {shown(pose)}")
+        raise ValueError(f"{name} must be three numbers (x, y, theta), got {shown(pose)}")
     x, y, theta = numbers
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(theta)):
-        raise ValueError(f"pose must be finite, got ({x}, {y}, {theta})")
+        raise ValueError(f"{name} must be finite, got ({x}, {y}, {theta})")
     return (x, y, theta)
 
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from gymnasium import spaces
 from gymnasium.error import InvalidAction
 
+from flatland.checks import checked_positive, plain_numbers, shown
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray, FloatArray
 from flatland.plugin_api.body_drive import BodyDrive
@@ -245,13 +246,15 @@ class DiscreteAction(Action):
         """
         kind = VelocityAction() if kind is None else kind
         if not isinstance(kind, _ContinuousAction):
-            raise TypeError(f"kind must be a continuous action, got {kind!r}")
+            raise TypeError(f"kind must be a continuous action, got {shown(kind)}")
         self.kind = kind
         self.columns = kind.columns
-        expected = f"commands must be rows of {len(self.columns)} finite numbers, got {commands!r}"
+        expected = (
+            f"commands must be rows of {len(self.columns)} finite numbers, got {shown(commands)}"
+        )
         try:
             self.commands: DoubleArray = np.array(commands, np.float64)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise ValueError(expected) from error
         shape = self.commands.shape
         if len(shape) != 2 or shape[0] < 1 or shape[1] != len(self.columns):
@@ -293,7 +296,9 @@ class DiscreteAction(Action):
         indices = _as_array(actions, shape, "iu", "integers")
         is_unknown = (indices < 0) | (indices >= count)
         if is_unknown.any():
-            raise InvalidAction(f"actions must be integers from 0 to {count - 1}, got {actions!r}")
+            raise InvalidAction(
+                f"actions must be integers from 0 to {count - 1}, got {shown(actions)}"
+            )
         chosen = self.commands[indices.reshape(-1)]
         numbers: DoubleArray = 2.0 * (chosen - low) / (high - low) - 1.0
         return numbers
@@ -336,10 +341,12 @@ def _as_array(actions: object, shape: tuple[int, ...], kinds: str, what: str) ->
     try:
         given = np.asarray(actions)
     except ValueError as error:  # rows of different lengths
-        raise InvalidAction(f"actions must be {what} of shape {shape}, got {actions!r}") from error
+        raise InvalidAction(
+            f"actions must be {what} of shape {shape}, got {shown(actions)}"
+        ) from error
     # A conversion would read strings, and drop the imaginary part of complex numbers.
     if given.dtype.kind not in kinds:
-        raise InvalidAction(f"actions must be {what} of shape {shape}, got {actions!r}")
+        raise InvalidAction(f"actions must be {what} of shape {shape}, got {shown(actions)}")
     if given.shape != shape:
         raise InvalidAction(f"actions must have the shape {shape}, got {given.shape}")
     return given
@@ -367,12 +374,15 @@ def _steered_drive(agent: Agent) -> TricycleDrive | AckermannDrive:
 
 
 def _checked_speeds(speed: tuple[float, float] | None) -> tuple[float, float] | None:
-    if speed is not None and not (np.isfinite(speed).all() and speed[0] < speed[1]):
-        raise ValueError(f"speed must be the lowest and the highest speed [m/s], got {speed}")
-    return speed
+    if speed is None:
+        return None
+    numbers = plain_numbers(speed, (2,))
+    if numbers is None or not (all(map(math.isfinite, numbers)) and numbers[0] < numbers[1]):
+        raise ValueError(
+            f"speed must be the lowest and the highest speed [m/s], got {shown(speed)}"
+        )
+    return (numbers[0], numbers[1])
 
 
 def _checked_limit(name: str, value: float | None, unit: str) -> float | None:
-    if value is not None and not (np.isfinite(value) and value > 0):
-        raise ValueError(f"{name} must be positive [{unit}], got {value}")
-    return value
+    return None if value is None else checked_positive(name, value, unit)

@@ -6,16 +6,18 @@ import os
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from flatland import worldgen
-from flatland.checks import checked_count
+from flatland.checks import checked_count, checked_path, shown
 from flatland.gym.worlds import find_world, included_robot
 from flatland.world import World
 from flatland.worldgen.random_world import DEFAULT_RADIUS, DEFAULT_RESOLUTION
 
 if TYPE_CHECKING:
     from flatland.config.inputs import Params
+
+_MAX_COUNT: Final = 100_000
 
 
 class Buildings:
@@ -39,9 +41,9 @@ class Buildings:
             TypeError: A single file is given.
             ValueError: There is none.
         """
-        if isinstance(worlds, str | os.PathLike):
-            raise TypeError(f"worlds must be several files, got {worlds!r}")
-        self.worlds = tuple(worlds)
+        if isinstance(worlds, str | os.PathLike) or not isinstance(worlds, Iterable):
+            raise TypeError(f"worlds must be several files, got {shown(worlds)}")
+        self.worlds = tuple(checked_path("each of worlds", each) for each in worlds)
         if not self.worlds:
             raise ValueError("worlds must contain at least one file")
 
@@ -114,7 +116,9 @@ class RandomBuildings(Buildings):
         self.robot = robot
         self.resolution = resolution
         self.radius = radius
-        super().__init__(f"{kind}_{number}" for number in range(checked_count("count", count)))
+        super().__init__(
+            f"{kind}_{number}" for number in range(checked_count("count", count, 1, _MAX_COUNT))
+        )
 
     def load(self, number: int, params: Params, step_size: float) -> World:
         """Generates and loads a building.

@@ -18,6 +18,7 @@ from flatland.controllers import Capabilities, Perception
 from flatland.geometry import FloatArray
 from flatland.gym.actions import VelocityAction, limit_to_unit
 from flatland.gym.observations import Goal, ObservationPart, Scan, Velocity
+from flatland.gym.staged import episodes_of
 
 if TYPE_CHECKING:
     import gymnasium
@@ -47,11 +48,11 @@ class Controller:
                 `flatland.controllers`.
 
         Raises:
+            TypeError: It is another environment.
             ValueError: The observation lacks a part, the action is no `VelocityAction`, or an
                 option is out of range.
         """
-        inner: Any = env.unwrapped
-        episodes = inner.episodes
+        episodes = episodes_of(env)
         agent, situation = episodes.agents[0], episodes.situation
         if not isinstance(episodes.settings.action, VelocityAction):
             raise ValueError("controllers require environments with a VelocityAction")

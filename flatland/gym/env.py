@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 from gymnasium.error import ResetNeeded
 
+from flatland.checks import checked_count, checked_options
 from flatland.geometry import FloatArray
 from flatland.gym.settings import Settings
 from flatland.gym.stage import RENDER_MODES, Image, Stage
@@ -103,13 +104,14 @@ class FlatlandEnv(Staged, gymnasium.Env[Any, FloatArray]):
         Raises:
             ClosedEnvironmentError: The environment is closed.
             WorldError: No place is free, or no path leads to the start or the goal.
-            ValueError: An option is unknown or invalid.
+            ValueError: The seed is no integer of at least 0, or an option is unknown or invalid.
         """
-        super().reset(seed=seed)
+        given = checked_options(options, ("goal", "start"))
+        super().reset(seed=None if seed is None else checked_count("seed", seed, 0))
         self._stage.check_open()
         self._running = False
         self._stage.restore(0, self.np_random)
-        self._episodes.begin(0, self.np_random, Occupied(), options or {})
+        self._episodes.begin(0, self.np_random, Occupied(), given)
         self._episodes.look()
         self._running = True
         self._stage.show()

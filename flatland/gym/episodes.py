@@ -11,10 +11,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from flatland.checks import checked_positive, shown
 from flatland.errors import WorldError
-from flatland.geometry import BoolArray, DoubleArray, FloatArray, Pose, Vector2, finite_pose
+from flatland.geometry import (
+    BoolArray,
+    DoubleArray,
+    FloatArray,
+    Pose,
+    Vector2,
+    finite_place,
+    finite_pose,
+)
 from flatland.gym.agents import check_alike
 from flatland.gym.batch import Batch, step_agents
+from flatland.gym.endings import as_ending, endings_of
+from flatland.gym.rewards import as_reward, rewards_of
 from flatland.gym.situation import Rows, Situation
 from flatland.gym.tasks import Occupied, Task
 from flatland.plugins.laser import compute_scans
@@ -64,6 +75,8 @@ class Episodes:
         first = agents[0]
         self.agents = list(agents)
         self.settings = settings
+        self._reward = as_reward("reward", settings.reward)
+        self._ending = as_ending("ending", settings.ending)
         self._num_threads = num_threads
         self._buildings = list(buildings)
         self._tasks = [_prepared(settings.task, agent) for agent in firsts]
@@ -138,20 +151,23 @@ class Episodes:
     ) -> None:
         """Begins an episode of an agent whose world is in its initial state.
 
+        Args:
+            row: Index of the agent.
+            rng: Source of all random numbers.
+            occupied: The places that other agents of the world occupy.
+            options: `start`, a pose, and `goal`, a place, instead of those of the task.
+
         Raises:
             WorldError: The start or the goal is not free, or no path leads there.
-            ValueError: An option is unknown or invalid.
+            TypeError: The task draws something else than a start and a goal.
+            ValueError: An option is invalid.
         """
         agent, s = self.agents[row], self.situation
         self.randomization.begin(row, agent, rng)
         task = self._tasks[self._buildings[row]]
-        start, goal = task.draw(agent, rng, occupied)
-        if options:
-            unknown = sorted(set(options) - {"start", "goal"})
-            if unknown:
-                raise ValueError(f"options must be among goal and start, got {', '.join(unknown)}")
-            start = finite_pose(options.get("start", start))
-            goal = finite_pose((*options.get("goal", goal), 0.0))[:2]
+        start, goal = _drawn(task, agent, rng, occupied)
+        start = finite_pose(options.get("start", start), "start")
+        goal = finite_place("goal", options.get("goal", goal))
         self._refuse_taken(agent, start, goal, occupied)
         if options:
             task.check_paths(start, goal)
@@ -283,10 +299,15 @@ class Episodes:
         self.observations = self.randomization.change_observations(self._present, s, chosen)
 
     def judge(self) -> tuple[DoubleArray, BoolArray, BoolArray]:
-        """Returns rewards, which episodes terminated and which were truncated, (n,) each."""
+        """Returns rewards, which episodes terminated and which were truncated, (n,) each.
+
+        Raises:
+            TypeError: A custom reward or ending returned values of another type.
+            ValueError: It returned another shape, NaN or infinite numbers.
+        """
         s, settings = self.situation, self.settings
-        rewards = settings.reward.compute(s)
-        terminated = settings.ending.check(s)
+        rewards = rewards_of(self._reward, s)
+        terminated = endings_of(self._ending, s)
         limit = math.inf if settings.max_steps is None else settings.max_steps
         truncated: BoolArray = (s.steps >= limit) & ~terminated
         return rewards, terminated, truncated
@@ -305,4 +326,25 @@ def _prepared(task: Task, agent: Agent) -> Task:
     """Returns a copy of a task that is prepared for the world of an agent."""
     prepared = copy.copy(task)
     prepared.prepare(agent)
+    checked_positive(f"goal_radius of {type(task).__name__}", prepared.goal_radius, "m")
     return prepared
+
+
+def _drawn(
+    task: Task, agent: Agent, rng: np.random.Generator, occupied: Occupied
+) -> tuple[Pose, Vector2]:
+    """Returns the start and the goal that a task draws.
+
+    Raises:
+        TypeError: The task returns something else.
+        WorldError: There is no room.
+    """
+    drawn = task.draw(agent, rng, occupied)
+    try:
+        start, goal = drawn
+        return finite_pose(start), finite_place("goal", goal)
+    except (TypeError, ValueError):
+        raise TypeError(
+            f"{type(task).__name__}.draw must return a start (x, y, theta) and a goal (x, y), got "
+            f"{shown(drawn)}"
+        ) from None

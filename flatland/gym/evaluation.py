@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from flatland.checks import checked_count
+from flatland.checks import check_function, check_kind, checked_count
 from flatland.geometry import BoolArray
-
-if TYPE_CHECKING:
-    from flatland.gym.vector import FlatlandVectorEnv
+from flatland.gym.policies import Policy
+from flatland.gym.vector import FlatlandVectorEnv
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,39 +61,50 @@ def evaluate(
         choose: Returns the actions for the observations of all environments, such as a
             `Controller` or a `Policy`. If it has a method `reset`, that is called at the start of
             episodes, with an array of bools of shape (num_envs,) that selects them.
-        envs: Environments of the autoreset mode `SAME_STEP`.
-        episodes: Number of episodes, of any number of environments.
+        envs: Environments of the autoreset mode `SAME_STEP`. Afterwards, they must be reset.
+        episodes: Number of episodes, of any number of environments; no others begin.
         seed: Seed of the first episode.
 
     Raises:
+        TypeError: `choose` is no function, or `envs` are other environments.
         ValueError: The environments have another mode, or there is no episode.
+        PolicyError: The policy was trained with another duration of an action.
     """
+    check_function("choose", choose)
+    check_kind("envs", envs, FlatlandVectorEnv, "a FlatlandVectorEnv")
     if envs.autoreset_mode is not AutoresetMode.SAME_STEP:
         raise ValueError(f"the autoreset mode must be SAME_STEP, got {envs.autoreset_mode}")
+    if isinstance(choose, Policy):
+        choose.check_period(envs.episodes.settings.dt)
     episodes, n = checked_count("episodes", episodes), envs.num_envs
+    seed = checked_count("seed", seed, 0)
     reset: Callable[[BoolArray], object] = getattr(choose, "reset", lambda _: None)
-    observations, _ = envs.reset(seed=seed)
-    reset(np.ones(n, np.bool_))
     numbers = np.arange(n)  # of the episodes in the environments
     lengths = np.zeros(n, np.int64)
     results = np.zeros((episodes, 3), np.int64)
-    while (numbers < episodes).any():
-        observations, _, terminated, truncated, infos = envs.step(choose(observations))
-        lengths += 1
-        ended = terminated | truncated
+    begun = numbers < episodes
+    envs.reset(seed=seed, options={"reset_mask": begun})
+    reset(np.ones(n, np.bool_))
+    running = begun.copy()
+    while running.any():
+        # Environments without an episode repeat an action that has no effect on them.
+        actions = np.array(choose(envs.observations_of(running)))
+        if actions.ndim and len(actions) == n:
+            actions[~running] = actions[running.argmax()]
+        ended = envs.step_rows(actions, running)
+        lengths += running
         if not ended.any():
             continue
-        counted = ended & (numbers < episodes)
-        final = infos["final_info"]
+        final = envs.episodes.infos()
         columns = final["is_success"], final["collision"], lengths
-        results[numbers[counted]] = np.stack([column[counted] for column in columns], axis=1)
+        results[numbers[ended]] = np.stack([column[ended] for column in columns], axis=1)
         numbers[ended] = numbers.max() + 1 + np.arange(np.count_nonzero(ended))
         lengths[ended] = 0
-        # Environments without a further episode continue until the others end.
         begun = ended & (numbers < episodes)
         if begun.any():
             seeds = [seed + number for number in numbers.tolist()]
-            observations, _ = envs.reset(seed=seeds, options={"reset_mask": begun})
+            envs.reset(seed=seeds, options={"reset_mask": begun})
+        running = (running & ~ended) | begun
         reset(ended)
     success, collision, steps = results.T
     return Outcomes(success.astype(np.bool_), collision.astype(np.bool_), steps)

@@ -14,7 +14,7 @@ from pettingzoo import ParallelEnv
 
 from flatland.checks import checked_count
 from flatland.geometry import FloatArray
-from flatland.gym.robots import begin_together, fleet_settings, spawn_robots, stop
+from flatland.gym.robots import MAX_ROBOTS, begin_together, fleet_settings, spawn_robots, stop
 from flatland.gym.stage import RENDER_MODES, Image, Stage
 from flatland.gym.staged import Staged
 
@@ -68,7 +68,7 @@ class FleetEnv(Staged, ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc,
             TypeError: An argument is unknown or has the wrong type.
             ValueError: An argument is out of range.
         """
-        num_robots = checked_count("num_robots", num_robots)
+        num_robots = checked_count("num_robots", num_robots, 1, MAX_ROBOTS)
         settings = fleet_settings(world, arguments)
         self.possible_agents = [f"robot_{i}" for i in range(num_robots)]
         self.agents: list[str] = []
@@ -123,6 +123,7 @@ class FleetEnv(Staged, ParallelEnv[str, Any, FloatArray]):  # type: ignore[misc,
         """
         self._stage.check_open()
         if seed is not None or self._rng is None:
+            seed = None if seed is None else checked_count("seed", seed, 0)
             self._rng, _ = seeding.np_random(seed)
         self.agents = []
         self._stage.restore(0, self._rng)

@@ -11,12 +11,12 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 
-from flatland.checks import checked_count
+from flatland.checks import checked_count, checked_options
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray
-from flatland.gym.robots import begin_together, fleet_settings, spawn_robots, stop
+from flatland.gym.robots import MAX_ROBOTS, begin_together, fleet_settings, spawn_robots, stop
 from flatland.gym.staged_vector import StagedVector
-from flatland.gym.vector import checked_mask, checked_seeds, masked_infos
+from flatland.gym.vector import MAX_ENVS, checked_mask, checked_seeds, masked_infos
 
 
 class FleetVectorEnv(StagedVector):
@@ -69,8 +69,8 @@ class FleetVectorEnv(StagedVector):
             ValueError: An argument is out of range.
         """
         super().__init__()
-        self.num_worlds = checked_count("num_envs", num_envs)
-        self.num_robots = checked_count("num_robots", num_robots)
+        self.num_worlds = checked_count("num_envs", num_envs, 1, MAX_ENVS)
+        self.num_robots = checked_count("num_robots", num_robots, 1, MAX_ROBOTS)
         settings = fleet_settings(world, arguments)
         names = [f"robot_{number}" for number in range(self.num_robots)]
         self._enter(
@@ -120,10 +120,8 @@ class FleetVectorEnv(StagedVector):
             ValueError: An option or the number of seeds is invalid.
         """
         self._stage.check_open()
-        unknown = sorted(set(options or {}) - {"reset_mask"})
-        if unknown:
-            raise ValueError(f"options must be among reset_mask, got {', '.join(unknown)}")
-        mask = checked_mask("reset_mask", (options or {}).get("reset_mask"), self.num_envs)
+        given = checked_options(options, ("reset_mask",))
+        mask = checked_mask("reset_mask", given.get("reset_mask"), self.num_envs)
         of_worlds = mask.reshape(self.num_worlds, self.num_robots)
         if not mask.any() or (of_worlds.any(axis=1) != of_worlds.all(axis=1)).any():
             raise ValueError(

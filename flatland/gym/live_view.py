@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from gymnasium.error import DependencyNotInstalled
 
+from flatland.checks import checked_count, shown
 from flatland.defaults import WEB_PORT
 from flatland.errors import FlatlandError
 from flatland.extras import MissingPackageError, require
@@ -48,6 +49,20 @@ def check_live_view(port: int | None) -> None:
     _find_port(port)
 
 
+def checked_port(port: int) -> int:
+    """Returns the argument `web_port` of an environment.
+
+    Raises:
+        ValueError: The port is invalid.
+    """
+    try:
+        return checked_count("web_port", port, 0, _MAX_PORT)
+    except ValueError:
+        raise ValueError(
+            f"web_port must be an integer from 0 to {_MAX_PORT}, got {shown(port)}"
+        ) from None
+
+
 def _find_port(port: int | None) -> int | None:
     """Returns the port of an argument or of the environment variable, None if neither is given.
 
@@ -55,9 +70,7 @@ def _find_port(port: int | None) -> int | None:
         ValueError: The port is invalid.
     """
     if port is not None:
-        if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= _MAX_PORT:
-            raise ValueError(f"web_port must be an integer from 0 to {_MAX_PORT}, got {port!r}")
-        return port
+        return checked_port(port)
     text = os.environ.get(PORT_VARIABLE, "")
     if not text:
         return None

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from flatland.checks import checked_count
+from flatland.checks import checked_count, checked_positive
 from flatland.geometry import BoolArray, DoubleArray, FloatArray
 from flatland.gym.observations import ObservationPart
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from flatland.gym.situation import Situation
     from flatland.world import World
 
+_MAX_CELLS: Final = 4096  # along each axis
 _FREE, _UNKNOWN, _OCCUPIED = 0.0, 127.0, 255.0
 _WALLS, _MODELS, _GOAL = range(3)  # channels
 
@@ -32,10 +33,8 @@ class _Grid:
     """
 
     def __init__(self, count: int, resolution: float) -> None:
-        if not (math.isfinite(resolution) and resolution > 0):
-            raise ValueError(f"resolution must be positive [m], got {resolution}")
-        self.count = checked_count("cells", count, 2)
-        self.resolution = resolution
+        self.resolution = resolution = checked_positive("resolution", resolution, "m")
+        self.count = count = checked_count("cells", count, 2, _MAX_CELLS)
         self.x: DoubleArray = (count / 2 - 0.5 - np.arange(count)) * resolution
         self.y = self.x
 
@@ -166,9 +165,7 @@ class LocalMap(ObservationPart):
             ValueError: A number is out of range.
         """
         self._grid = _Grid(pixels, resolution)
-        if not (math.isfinite(goal_radius) and goal_radius > 0):
-            raise ValueError(f"goal_radius must be positive [m], got {goal_radius}")
-        self.goal_radius = goal_radius
+        self.goal_radius = checked_positive("goal_radius", goal_radius, "m")
 
     def size(self, beams: int) -> int:  # noqa: ARG002 - does not depend on the laser
         """Returns the number of values."""

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import copy
-import math
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 from gymnasium import spaces
 
-from flatland.checks import checked_count
+from flatland.checks import check_kind, checked_count, checked_positive
 from flatland.geometry import DoubleArray, FloatArray
 
 if TYPE_CHECKING:
@@ -90,12 +89,8 @@ class Scan(ObservationPart):
         Raises:
             ValueError: There is less than 1 sector, or `half` is not positive.
         """
-        if half is not None and not (math.isfinite(half) and half > 0):
-            raise ValueError(f"half must be positive [m], got {half}")
-        self.half = half
-        if sectors is not None and sectors < 1:
-            raise ValueError(f"sectors must be at least 1, got {sectors}")
-        self.sectors = sectors
+        self.half = None if half is None else checked_positive("half", half, "m")
+        self.sectors = None if sectors is None else checked_count("sectors", sectors)
 
     def size(self, beams: int) -> int:
         """Returns the number of sectors, or of beams."""
@@ -146,9 +141,7 @@ class Goal(ObservationPart):
         Raises:
             ValueError: `scale` is not positive.
         """
-        if not scale > 0:
-            raise ValueError(f"scale must be positive [m], got {scale}")
-        self.scale = scale
+        self.scale = checked_positive("scale", scale, "m")
 
     def size(self, beams: int) -> int:  # noqa: ARG002 - does not depend on the laser
         """Returns 3."""
@@ -184,7 +177,11 @@ class Velocity(ObservationPart):
 
         Args:
             sideways: Whether the sideways velocity is observed.
+
+        Raises:
+            TypeError: It is no bool.
         """
+        check_kind("sideways", sideways, bool, "True or False")
         self.sideways = sideways
 
     def size(self, beams: int) -> int:  # noqa: ARG002 - does not depend on the laser
@@ -235,9 +232,7 @@ class LastAction(ObservationPart):
         Raises:
             ValueError: It is not 2 or 3.
         """
-        if numbers not in (2, 3):
-            raise ValueError(f"numbers must be 2 or 3, got {numbers!r}")
-        self.numbers = numbers
+        self.numbers = checked_count("numbers", numbers, 2, 3)
 
     def size(self, beams: int) -> int:  # noqa: ARG002 - does not depend on the laser
         """Returns the number of numbers."""
@@ -270,8 +265,10 @@ class Stacked(ObservationPart):
             count: Number of observations.
 
         Raises:
+            TypeError: `part` is no part.
             ValueError: `count` is not an integer of at least 1.
         """
+        check_kind("part", part, ObservationPart, "an ObservationPart")
         self.part = part
         self.count = checked_count("count", count)
         self.name, self.low, self.high = part.name, part.low, part.high
@@ -322,8 +319,11 @@ class Observation:
             as_dict: Whether observations are dictionaries.
 
         Raises:
+            TypeError: A part is no `ObservationPart`.
             ValueError: Two parts have the same name.
         """
+        for part in parts:
+            check_kind("each part", part, ObservationPart, "an ObservationPart")
         self.parts = parts or (Scan(), Goal(), Velocity())
         self.as_dict = as_dict
         names = [part.name for part in self.parts]

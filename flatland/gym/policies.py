@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,10 +11,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from flatland.checks import checked_path
 from flatland.errors import FlatlandError
 from flatland.extras import require
 from flatland.geometry import FloatArray
 from flatland.gym.observations import Observation
+from flatland.gym.staged import episodes_of
 
 if TYPE_CHECKING:
     import gymnasium
@@ -56,8 +59,7 @@ class PolicyRobot:
         cls, env: gymnasium.Env[Any, Any] | gymnasium.vector.VectorEnv[Any, Any, Any]
     ) -> PolicyRobot:
         """Returns the robot of a `FlatlandEnv` or a `FlatlandVectorEnv`, also within wrappers."""
-        inner: Any = env.unwrapped
-        episodes = inner.episodes
+        episodes = episodes_of(env)
         agent, situation = episodes.agents[0], episodes.situation
         (low_v, low_omega), (high_v, high_omega) = situation.low.tolist(), situation.high.tolist()
         return cls(
@@ -126,7 +128,7 @@ class Policy:
                 environment differs.
         """
         runtime = require("onnxruntime", "policies require")
-        self.path = INCLUDED if file is None else Path(file)
+        self.path = INCLUDED if file is None else Path(checked_path("file", file))
         if not self.path.is_file():
             raise PolicyError(f"file not found: {self.path}")
         options = runtime.SessionOptions()
@@ -157,6 +159,21 @@ class Policy:
         if env is not None and PolicyRobot.of(env) != self.robot:
             raise PolicyError(
                 f"{self.path} drives {self.robot}, the environment has {PolicyRobot.of(env)}"
+            )
+
+    def check_period(self, dt: float) -> None:
+        """Checks that actions have the duration of the training.
+
+        Args:
+            dt: Duration of an action [s].
+
+        Raises:
+            PolicyError: The duration differs by more than a thousandth.
+        """
+        if not math.isclose(dt, self.robot.dt, rel_tol=1e-3):
+            raise PolicyError(
+                f"{self.path} was trained with actions of {self.robot.dt:g} s, here they last "
+                f"{dt:g} s"
             )
 
     def __call__(self, observation: Any) -> FloatArray:

@@ -6,12 +6,12 @@ import copy
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from flatland.checks import checked_count
+from flatland.checks import check_kind, checked_count, checked_names, plain_numbers, shown
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray, FloatArray
 from flatland.plugin_api.body_drive import BodyDrive
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from flatland.world import World
 
 Interval = tuple[float, float]
+_MAX_DELAY: Final = 1_000_000  # steps of the environment
 
 
 class Randomization:
@@ -107,6 +108,7 @@ class RandomizationSum(Randomization):
         """Combines parts; nested sums are merged."""
         self.parts: tuple[Randomization, ...] = ()
         for part in parts:
+            check_kind("each part", part, Randomization, "a Randomization")
             self.parts += part.parts if isinstance(part, RandomizationSum) else (part,)
 
     def check(self, agent: Agent) -> None:
@@ -261,7 +263,7 @@ class _Latency(Randomization):
             ValueError: The delays are not two increasing integers of at least 0.
         """
         low, high = _pair("steps", steps)
-        low, high = checked_count("steps", low, 0), checked_count("steps", high, 0)
+        low, high = (checked_count("steps", each, 0, _MAX_DELAY) for each in (low, high))
         if low > high:
             raise ValueError(f"steps must be the least and the greatest delay, got {steps}")
         self.steps = (low, high)
@@ -491,7 +493,7 @@ class ObstacleSize(Randomization):
         """
         if isinstance(models, str):
             raise TypeError(f"models must be several names, got {models!r}")
-        self.models = tuple(models)
+        self.models = tuple(checked_names("models", models))
         self.factor = _checked_interval("factor", factor, 0.1, 10.0)
 
     def check(self, agent: Agent) -> None:
@@ -532,23 +534,23 @@ def _pair(name: str, values: Sequence[float]) -> tuple[float, float]:
         low, high = values
     except (TypeError, ValueError):
         raise ValueError(
-            f"{name} must be the least and the greatest value, got {values!r}"
+            f"{name} must be the least and the greatest value, got {shown(values)}"
         ) from None
     return low, high
 
 
 def _checked_interval(name: str, values: Interval, least: float, greatest: float) -> Interval:
-    low, high = _pair(name, values)
+    low, high = plain_numbers(_pair(name, values), (2,)) or (math.nan, math.nan)
     if not (least <= low <= high <= greatest and math.isfinite(high)):
         limits = (
             f"at least {least:g}" if greatest == math.inf else f"from {least:g} to {greatest:g}"
         )
-        raise ValueError(f"{name} must be two increasing numbers {limits}, got {values!r}")
-    return (float(low), float(high))
+        raise ValueError(f"{name} must be two increasing numbers {limits}, got {shown(values)}")
+    return (low, high)
 
 
 def _checked_factors(name: str, values: Interval) -> Interval:
     low, high = _checked_interval(name, values, 0.0, math.inf)
     if not low > 0:
-        raise ValueError(f"{name} must be two positive factors, got {values!r}")
+        raise ValueError(f"{name} must be two positive factors, got {shown(values)}")
     return (low, high)

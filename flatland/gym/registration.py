@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import functools
+import threading
+import weakref
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, Literal, NoReturn, overload
 
 import gymnasium
-from gymnasium.envs.registration import VectorizeMode
+from gymnasium.envs.registration import EnvSpec, VectorizeMode
 from gymnasium.error import NameNotFound, UnsupportedMode
 
 from flatland.extras import require
 from flatland.gym.buildings import RandomBuildings
+from flatland.gym.env import FlatlandEnv
 from flatland.gym.settings import DEFAULT_STEPS
+from flatland.gym.staged_vector import RegisteredLimit
 
 if TYPE_CHECKING:
     from flatland.gym.fleet import FleetEnv
@@ -34,27 +39,64 @@ PARALLEL: Final[dict[str, dict[str, Any]]] = {"flatland/Fleet-v0": {"world": "fl
 """Arguments of the environments with several robots."""
 
 
+class _Spec(EnvSpec):
+    """A registered environment, for which `max_steps` and `max_episode_steps` are one limit.
+
+    `gymnasium.make` limits an environment to `max_episode_steps` of its registration unless that is
+    an argument. It reads the attribute twice after it has created the environment, in the same
+    thread: `made` provides these values, until the environment is reset.
+    """
+
+    made = threading.local()
+
+    @property
+    def max_episode_steps(self) -> int:
+        """The argument `max_steps` of the environment that is being made, or the registered one."""
+        env, reads = vars(self.made).get("env", lambda: None)(), vars(self.made).get("reads", 0)
+        if env is None or env._np_random is not None or not reads:
+            return self._steps
+        self.made.reads = reads - 1
+        steps: int | None = env.episodes.settings.max_steps
+        return self._steps if steps is None else steps
+
+    @max_episode_steps.setter
+    def max_episode_steps(self, steps: int) -> None:
+        self._steps = RegisteredLimit(steps)
+
+
+def make_single(**arguments: Any) -> FlatlandEnv:
+    """Creates an environment for `gymnasium.make`; see `FlatlandEnv`."""
+    env = FlatlandEnv(**arguments)
+    _Spec.made.env, _Spec.made.reads = weakref.ref(env), 2
+    return env
+
+
+make_single.metadata = FlatlandEnv.metadata  # type: ignore[attr-defined]  # read by Gymnasium
+
+
 def register_all() -> None:
     """Registers all environments with Gymnasium."""
     for name, arguments in SINGLE.items():
-        gymnasium.register(
-            name,
-            entry_point="flatland.gym.env:FlatlandEnv",
-            vector_entry_point="flatland.gym.vector:FlatlandVectorEnv",
-            # The limit of Gymnasium, so that its argument `max_episode_steps` replaces it.
-            max_episode_steps=STEPS.get(name, DEFAULT_STEPS),
-            kwargs={**arguments, "max_steps": None},
+        _register(
+            name, "flatland.gym.registration:make_single", "vector:FlatlandVectorEnv", arguments
         )
-    for name in PARALLEL:
+    for name, arguments in PARALLEL.items():
         # Gymnasium has no environments with several agents, apart from vectors of their robots: the
         # entry point raises an error.
-        gymnasium.register(
-            name,
-            entry_point=functools.partial(_refuse, name),
-            vector_entry_point="flatland.gym.fleet_vector:FleetVectorEnv",
-            max_episode_steps=DEFAULT_STEPS,
-            kwargs={**PARALLEL[name], "max_steps": None},
-        )
+        refuse = functools.partial(_refuse, name)
+        _register(name, refuse, "fleet_vector:FleetVectorEnv", arguments)
+
+
+def _register(
+    name: str, entry_point: str | Callable[..., Any], vector: str, arguments: dict[str, Any]
+) -> None:
+    gymnasium.registry[name] = _Spec(
+        name,
+        entry_point,
+        vector_entry_point=f"flatland.gym.{vector}",
+        max_episode_steps=STEPS.get(name, DEFAULT_STEPS),
+        kwargs={**arguments, "max_steps": None},
+    )
 
 
 @overload
@@ -86,8 +128,6 @@ def make_vec(name: str, num_envs: int = 1, **arguments: Any) -> FlatlandVectorEn
     if name not in SINGLE and name not in PARALLEL:
         known = ", ".join([*SINGLE, *PARALLEL])
         raise NameNotFound(f'environment "{name}" does not exist; known: {known}')
-    if arguments.get("max_steps") is not None:
-        arguments.setdefault("max_episode_steps", arguments["max_steps"])
     envs: Any = gymnasium.make_vec(
         name, num_envs, vectorization_mode=VectorizeMode.VECTOR_ENTRY_POINT, **arguments
     )

@@ -3,26 +3,41 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
+from flatland.checks import checked_finite, checked_positive, shown
 from flatland.geometry import DoubleArray
 
 if TYPE_CHECKING:
     from flatland.gym.situation import Situation
 
 
+RewardFunction = Callable[["Situation"], npt.ArrayLike]
+"""Returns the reward of each agent for the last step, shape (n,), finite."""
+
+
 class Reward(ABC):
-    """A reward of all agents; `+` and `*` combine rewards."""
+    """A reward of all agents; `+` and `*` combine rewards, also with functions.
+
+    A custom reward is a subclass, or a function that is called as `compute`. What it returns is
+    checked in each step.
+    """
 
     @abstractmethod
     def compute(self, situation: Situation) -> DoubleArray:
-        """Returns the reward of each agent for the last step, shape (n,)."""
+        """Returns the reward of each agent for the last step, shape (n,), finite."""
 
-    def __add__(self, other: Reward) -> Reward:
+    def __add__(self, other: Reward | RewardFunction) -> Reward:
         """Returns the sum of two rewards."""
         return Sum(self, other)
+
+    def __radd__(self, other: RewardFunction) -> Reward:
+        """Returns the sum of a function and the reward."""
+        return Sum(other, self)
 
     def __mul__(self, factor: float) -> Reward:
         """Returns the reward multiplied by a number."""
@@ -31,13 +46,95 @@ class Reward(ABC):
     __rmul__ = __mul__
 
 
+class FunctionReward(Reward):
+    """A reward that a function computes."""
+
+    def __init__(self, function: RewardFunction) -> None:
+        """Stores the function."""
+        self.function = function
+
+    def compute(self, situation: Situation) -> DoubleArray:
+        """Returns what the function returns."""
+        return self.function(situation)  # type: ignore[return-value]  # checked by `rewards_of`
+
+
+def as_reward(name: str, reward: Reward | RewardFunction) -> Reward:
+    """Returns a reward, which may be given as a function.
+
+    Args:
+        name: Name of the argument, for the error.
+        reward: The reward.
+
+    Raises:
+        TypeError: It is neither.
+    """
+    if isinstance(reward, Reward):
+        return reward
+    if callable(reward) and not isinstance(reward, type):
+        return FunctionReward(reward)
+    raise TypeError(f"{name} must be a Reward or a function of a Situation, got {shown(reward)}")
+
+
+def rewards_of(reward: Reward, situation: Situation) -> DoubleArray:
+    """Returns the reward of each agent for the last step, shape (n,).
+
+    Raises:
+        TypeError: A custom reward returned no numbers.
+        ValueError: A custom reward returned an array of another shape, NaN or infinite numbers.
+    """
+    values = reward.compute(situation)
+    if type(reward) in _INCLUDED:
+        return values
+    return checked_rows(_name_of(reward), values, len(situation), "fiub", np.float64)
+
+
+def checked_rows(
+    name: str, values: object, n: int, kinds: str, dtype: npt.DTypeLike
+) -> npt.NDArray[Any]:
+    """Returns a copy of what a custom reward or ending returned for n agents.
+
+    Args:
+        name: Name of the reward or the ending, for the error.
+        values: What it returned.
+        n: Number of agents.
+        kinds: Permitted kinds of types of numpy.
+        dtype: Type of the copy.
+
+    Raises:
+        TypeError: The values have another type.
+        ValueError: They have another shape than (n,), or are NaN or infinite.
+    """
+    what = "bools" if kinds == "b" else "finite numbers"
+    array = np.asarray(values)
+    if array.dtype.kind not in kinds:
+        raise TypeError(f"{name} must return {what} of the shape ({n},), got {shown(values)}")
+    if array.shape != (n,):
+        raise ValueError(f"{name} must return an array of the shape ({n},), got {array.shape}")
+    if not np.isfinite(array).all():
+        row = int((~np.isfinite(array)).argmax())
+        raise ValueError(f"{name} must return finite numbers, got {array[row]} for agent {row}")
+    return np.array(array, dtype)
+
+
+def _name_of(reward: Reward) -> str:
+    if isinstance(reward, FunctionReward):
+        function = reward.function
+        return f"the reward {getattr(function, '__qualname__', type(function).__qualname__)}"
+    return f"the reward {type(reward).__qualname__}"
+
+
 class Sum(Reward):
     """The sum of rewards."""
 
-    def __init__(self, *terms: Reward) -> None:
-        """Creates the sum; nested sums are merged."""
+    def __init__(self, *terms: Reward | RewardFunction) -> None:
+        """Creates the sum; nested sums are merged.
+
+        Raises:
+            TypeError: A term is neither a reward nor a function.
+        """
         self.terms: tuple[Reward, ...] = ()
-        for term in terms:
+        for given in terms:
+            term = as_reward("each term of a reward", given)
             self.terms += term.terms if isinstance(term, Sum) else (term,)
 
     def compute(self, situation: Situation) -> DoubleArray:
@@ -47,7 +144,7 @@ class Sum(Reward):
             return situation.core.rewards(weights)
         total = np.zeros(len(situation))
         for term in self.terms:
-            total += term.compute(situation)
+            total += rewards_of(term, situation)
         return total
 
 
@@ -55,13 +152,17 @@ class Scaled(Reward):
     """A reward multiplied by a number."""
 
     def __init__(self, reward: Reward, factor: float) -> None:
-        """Creates the product."""
+        """Creates the product.
+
+        Raises:
+            ValueError: The factor is no finite number.
+        """
         self.reward = reward
-        self.factor = float(factor)
+        self.factor = checked_finite("the factor of a reward", factor)
 
     def compute(self, situation: Situation) -> DoubleArray:
         """Returns the product."""
-        return self.reward.compute(situation) * self.factor
+        return rewards_of(self.reward, situation) * self.factor
 
 
 class Progress(Reward):
@@ -120,9 +221,7 @@ class Proximity(Reward):
         Raises:
             ValueError: `distance` is not positive.
         """
-        if not distance > 0:
-            raise ValueError(f"distance must be positive [m], got {distance}")
-        self.distance = distance
+        self.distance = checked_positive("distance", distance, "m")
 
     def compute(self, situation: Situation) -> DoubleArray:
         """Returns the proximity of the nearest range of each scan."""
@@ -132,6 +231,8 @@ class Proximity(Reward):
         return np.asarray(1.0 - near / self.distance)
 
 
+# A subclass may compute something else.
+_INCLUDED: Final = frozenset({Sum, Scaled, Progress, Arrival, Contact, Step, Jerkiness, Proximity})
 # Their numbers in the core. A subclass may compute something else.
 _IN_CORE: Final[dict[type[Reward], int]] = {Progress: 0, Arrival: 1, Contact: 2, Step: 3}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from flatland.values import Twist
 if TYPE_CHECKING:
     from flatland.gym.episodes import Episodes
     from flatland.world import World
+
+MAX_ROBOTS: Final = 10_000  # in a world
 
 
 def fleet_settings(world: str | os.PathLike[str], arguments: Mapping[str, Any]) -> Settings:

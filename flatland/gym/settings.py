@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from flatland.checks import checked_count
+from flatland.checks import check_kind, checked_count, checked_positive, shown
 from flatland.gym.actions import Action, VelocityAction
 from flatland.gym.agents import Agent, find_agent
 from flatland.gym.buildings import Buildings
-from flatland.gym.endings import Ending, navigation_ending
+from flatland.gym.endings import Ending, EndingFunction, as_ending, navigation_ending
 from flatland.gym.observations import Observation
 from flatland.gym.randomization import Randomization
-from flatland.gym.rewards import Reward, navigation_reward
+from flatland.gym.rewards import Reward, RewardFunction, as_reward, navigation_reward
 from flatland.gym.tasks import RandomGoal, Task
 from flatland.gym.worlds import find_world
+from flatland.runtime.stepping import MAX_STEPS
 from flatland.world import World
 
 if TYPE_CHECKING:
     from flatland.config.inputs import Params
 
+_MAX_REPEAT: Final = 1_000_000  # steps of the world in a step of the environment
 DEFAULT_STEPS: Final = 300
 """Limit of an episode [steps]."""
 
@@ -41,8 +42,8 @@ class Settings:
         task: Starts and goals.
         observation: What is observed.
         action: How actions are scaled.
-        reward: The reward.
-        ending: When an episode terminates.
+        reward: The reward, or a function that computes it.
+        ending: When an episode terminates, or a function that determines it.
         randomization: What differs between episodes besides starts, goals and buildings.
         max_steps: Number of steps after which an episode is truncated; None for no limit.
         physics_steps: Number of steps of the world in a step of the environment.
@@ -57,8 +58,8 @@ class Settings:
     task: Task = field(default_factory=RandomGoal)
     observation: Observation = field(default_factory=Observation)
     action: Action = field(default_factory=VelocityAction)
-    reward: Reward = field(default_factory=navigation_reward)
-    ending: Ending = field(default_factory=navigation_ending)
+    reward: Reward | RewardFunction = field(default_factory=navigation_reward)
+    ending: Ending | EndingFunction = field(default_factory=navigation_ending)
     randomization: Randomization = field(default_factory=Randomization)
     max_steps: int | None = DEFAULT_STEPS
     physics_steps: int = 20
@@ -66,18 +67,20 @@ class Settings:
     params: Params = None
 
     def __post_init__(self) -> None:
-        for name in ("max_steps", "physics_steps"):
-            value = getattr(self, name)
-            if value is not None or name != "max_steps":
-                object.__setattr__(self, name, checked_count(name, value))
+        checked: dict[str, Any] = {
+            "physics_steps": checked_count("physics_steps", self.physics_steps, 1, _MAX_REPEAT),
+            "step_size": checked_positive("step_size", self.step_size, "s"),
+            "reward": as_reward("reward", self.reward),
+            "ending": as_ending("ending", self.ending),
+        }
+        if self.max_steps is not None:
+            checked["max_steps"] = checked_count("max_steps", self.max_steps, 1, MAX_STEPS)
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
         if not isinstance(self.world, str | os.PathLike | Buildings):
-            raise TypeError(f"world must be a file, a name or Buildings, got {self.world!r}")
+            raise TypeError(f"world must be a file, a name or Buildings, got {shown(self.world)}")
         for name, kind in _KINDS.items():
-            value = getattr(self, name)
-            if not isinstance(value, kind):
-                raise TypeError(f"{name} must be a {kind.__name__}, got {value!r}")
-        if not (math.isfinite(self.step_size) and self.step_size > 0):
-            raise ValueError(f"step_size must be positive [s], got {self.step_size}")
+            check_kind(name, getattr(self, name), kind, f"a {kind.__name__}")
 
     @classmethod
     def from_arguments(cls, arguments: Mapping[str, Any]) -> Settings:
@@ -145,9 +148,7 @@ class Settings:
 
 _KINDS: dict[str, type] = {
     "action": Action,
-    "ending": Ending,
     "observation": Observation,
     "randomization": Randomization,
-    "reward": Reward,
     "task": Task,
 }

@@ -15,9 +15,10 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ClosedEnvironmentError
 
+from flatland.checks import shown
 from flatland.drawing.render import MATPLOTLIB_LOCK, make_figure
 from flatland.gym.episodes import Episodes
-from flatland.gym.live_view import EpisodeView, check_live_view
+from flatland.gym.live_view import EpisodeView, check_live_view, checked_port
 from flatland.gym.stock import Stock
 from flatland.runtime.randomization import randomize_plugins
 
@@ -77,8 +78,11 @@ class Stage:
         """
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise ValueError(
-                f"render_mode must be None or one of {', '.join(RENDER_MODES)}, got {render_mode!r}"
+                f"render_mode must be None or one of {', '.join(RENDER_MODES)}, got "
+                f"{shown(render_mode)}"
             )
+        if web_port is not None:
+            web_port = checked_port(web_port)
         if render_mode == "human":
             check_live_view(web_port)
         self.metadata = {**metadata, "render_fps": round(1 / settings.dt) or 1}

@@ -4,12 +4,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from flatland.checks import shown
 from flatland.gym.recreation import Recreated
 
 if TYPE_CHECKING:
     from flatland.gym.episodes import Episodes
     from flatland.gym.stage import Stage
     from flatland.gym.tasks import Task
+
+
+def episodes_of(env: object) -> Episodes:
+    """Returns the episodes of an environment or a vector, also within wrappers.
+
+    Raises:
+        TypeError: It is another environment.
+    """
+    inner = getattr(env, "unwrapped", None)
+    if not isinstance(inner, Staged):
+        raise TypeError(f"env must be a FlatlandEnv or a FlatlandVectorEnv, got {shown(env)}")
+    return inner.episodes
 
 
 class Staged(Recreated):

@@ -10,17 +10,39 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from flatland.checks import checked_count
+from flatland.checks import checked_count, shown
 from flatland.geometry import DoubleArray
 from flatland.gym.env import FlatlandEnv
 from flatland.gym.stage import Stage
 from flatland.gym.staged import Staged
+from flatland.runtime.batch import MAX_THREADS
+from flatland.runtime.stepping import MAX_STEPS
 
 if TYPE_CHECKING:
     from flatland.gym.agents import Agent
     from flatland.gym.settings import Settings
     from flatland.gym.stage import Image
     from flatland.world import World
+
+
+class RegisteredLimit(int):
+    """The limit of steps of a registered environment, which `max_steps` replaces.
+
+    `gymnasium.make_vec` passes it as `max_episode_steps` unless this argument is given.
+    """
+
+
+def checked_autoreset_mode(mode: object) -> AutoresetMode:
+    """Returns an autoreset mode, which may be given by its name or its value.
+
+    Raises:
+        ValueError: It is none.
+    """
+    for each in AutoresetMode:
+        if isinstance(mode, str | AutoresetMode) and mode in (each, each.name, each.value):
+            return each
+    names = ", ".join(each.name for each in AutoresetMode)
+    raise ValueError(f"autoreset_mode must be one of {names}, got {shown(mode)}")
 
 
 class StagedVector(Staged, VectorEnv[Any, Any, Any]):
@@ -52,10 +74,13 @@ class StagedVector(Staged, VectorEnv[Any, Any, Any]):
             web_port: Port of the viewer.
             max_episode_steps: Limit of the steps of an episode; None for that of the settings.
         """
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
-        num_threads = checked_count("num_threads", num_threads, 0)
-        if max_episode_steps is not None:
-            settings = settings.limited_to(checked_count("max_episode_steps", max_episode_steps))
+        self.autoreset_mode = checked_autoreset_mode(autoreset_mode)
+        num_threads = checked_count("num_threads", num_threads, 0, MAX_THREADS)
+        if max_episode_steps is not None and not (
+            isinstance(max_episode_steps, RegisteredLimit) and settings.max_steps is not None
+        ):
+            limit = checked_count("max_episode_steps", max_episode_steps, 1, MAX_STEPS)
+            settings = settings.limited_to(limit)
         world_name = settings.world_name
         self._stage = Stage(
             settings,

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flatland.checks import checked_not_negative, checked_positive, plain_numbers, shown
 from flatland.errors import WorldError
-from flatland.geometry import Pose, Vector2, finite_pose
+from flatland.geometry import Pose, Vector2, finite_place, finite_pose
 from flatland.gym.places import Places, random_pose
 
 if TYPE_CHECKING:
@@ -126,21 +127,17 @@ class RandomGoal(Task):
         Raises:
             ValueError: A number is out of range.
         """
-        low, high = distance
-        if not (goal_radius > 0 and math.isfinite(goal_radius)):
-            raise ValueError(f"goal_radius must be positive [m], got {goal_radius}")
-        if not (goal_radius <= low < high < math.inf):
+        self.goal_radius = checked_positive("goal_radius", goal_radius, "m")
+        lengths = plain_numbers(distance, (2,))
+        if lengths is None or not self.goal_radius <= lengths[0] < lengths[1] < math.inf:
             raise ValueError(
                 "distance must be two increasing lengths of at least the goal_radius of "
-                f"{goal_radius:g} m, got {distance}"
+                f"{self.goal_radius:g} m, got {shown(distance)}"
             )
-        if margin is not None and not (math.isfinite(margin) and margin >= 0):
-            raise ValueError(f"margin must be finite and not negative [m], got {margin}")
-        self.distance = (float(low), float(high))
-        self.margin = margin
-        self.clearance = clearance
-        self.goal_radius = goal_radius
-        self.origin = origin
+        self.distance = (lengths[0], lengths[1])
+        self.margin = None if margin is None else checked_not_negative("margin", margin, "m")
+        self.clearance = checked_not_negative("clearance", clearance, "m")
+        self.origin = None if origin is None else finite_place("origin", origin)
 
     def prepare(self, agent: Agent) -> None:
         """Prepares the free places of the map."""
@@ -187,11 +184,9 @@ class FixedGoal(Task):
         Raises:
             ValueError: A number is out of range.
         """
-        if not (goal_radius > 0 and math.isfinite(goal_radius)):
-            raise ValueError(f"goal_radius must be positive [m], got {goal_radius}")
-        self.start = finite_pose(start)
-        self.goal = finite_pose((*goal, 0.0))[:2]
-        self.goal_radius = goal_radius
+        self.goal_radius = checked_positive("goal_radius", goal_radius, "m")
+        self.start = finite_pose(start, "start")
+        self.goal = finite_place("goal", goal)
 
     def prepare(self, agent: Agent) -> None:
         """Checks that a path leads from the start to the goal, in a world with walls.

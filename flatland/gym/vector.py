@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 
-from flatland.checks import checked_count
+from flatland.checks import checked_count, checked_options, shown
 from flatland.errors import WorldError
 from flatland.geometry import BoolArray, DoubleArray
 from flatland.gym.settings import Settings
@@ -22,6 +22,8 @@ from flatland.gym.tasks import Occupied
 if TYPE_CHECKING:
     from flatland.gym.buildings import Buildings
     from flatland.gym.episodes import Episodes
+
+MAX_ENVS: Final = 1_000_000
 
 
 class FlatlandVectorEnv(StagedVector):
@@ -72,7 +74,7 @@ class FlatlandVectorEnv(StagedVector):
         settings = Settings.from_arguments({"world": world, **arguments})
         self._enter(
             settings,
-            checked_count("num_envs", num_envs),
+            checked_count("num_envs", num_envs, 1, MAX_ENVS),
             lambda world: [settings.find_agent(world)],
             autoreset_mode=autoreset_mode,
             num_threads=num_threads,
@@ -121,7 +123,7 @@ class FlatlandVectorEnv(StagedVector):
             ValueError: An option or the number of seeds is invalid.
         """
         self._stage.check_open()
-        mask, places = _checked_options(options or {}, self.num_envs)
+        mask, places = _checked_options(options, self.num_envs)
         rows = np.flatnonzero(mask)
         seeds = checked_seeds(seed, self.num_envs)
         for row in rows.tolist():
@@ -181,6 +183,44 @@ class FlatlandVectorEnv(StagedVector):
         self._stage.show()
         return self._present(), rewards, terminated, truncated, infos
 
+    def step_rows(self, actions: Any, rows: BoolArray) -> BoolArray:
+        """Carries out the actions of some environments; those whose episodes end begin no other.
+
+        Each of these must be reset before a call of `step`. `evaluate` uses this.
+
+        Args:
+            actions: An action for each environment; those of others must be valid, but have no
+                effect.
+            rows: The environments, shape (num_envs,), which have an episode.
+
+        Returns:
+            Which of their episodes have ended, shape (num_envs,).
+
+        Raises:
+            ClosedEnvironmentError: The environments are closed.
+            InvalidAction: The actions have the wrong shape, are NaN, or no real numbers.
+        """
+        self._stage.check_open()
+        numbers = self._episodes.read_actions(actions, self.num_envs)
+        acting = None if rows.all() else np.flatnonzero(rows)
+        self._episodes.step(numbers, acting, acting)
+        _, terminated, truncated = self._episodes.judge()
+        ended: BoolArray = (terminated | truncated) & rows
+        self._has_begun &= ~ended
+        self._stage.show()
+        return ended
+
+    def observations_of(self, rows: BoolArray) -> Any:
+        """Returns the last observations of some environments; those of others repeat the first one.
+
+        Args:
+            rows: The environments, at least one, shape (num_envs,).
+        """
+        if rows.all():
+            return self._present()
+        repeated = np.where(rows, np.arange(self.num_envs), rows.argmax())
+        return self._episodes.layout.present(self._episodes.observations[repeated])
+
     def _begin(self, rows: Rows, places: Sequence[Mapping[str, Any]] = ()) -> None:
         """Begins episodes.
 
@@ -222,7 +262,7 @@ class FlatlandVectorEnv(StagedVector):
 
 
 def _checked_options(
-    options: Mapping[str, Any], n: int
+    options: Mapping[str, Any] | None, n: int
 ) -> tuple[BoolArray, list[dict[str, DoubleArray]]]:
     """Returns the mask of environments to reset, and the options of each environment.
 
@@ -231,16 +271,14 @@ def _checked_options(
         ValueError: An option is unknown, or has the wrong shape.
     """
     known = ("goal", "goal_mask", "reset_mask", "start", "start_mask")
-    unknown = sorted(set(options) - set(known))
-    if unknown:
-        raise ValueError(f"options must be among {', '.join(known)}, got {', '.join(unknown)}")
+    options = checked_options(options, known)
     reset = checked_mask("reset_mask", options.get("reset_mask"), n)
     if not reset.any():
         raise ValueError('options["reset_mask"] must contain True')
     places: list[dict[str, DoubleArray]] = [{} for _ in range(n)]
     for name, size in (("start", 3), ("goal", 2)):
         mask = checked_mask(f"{name}_mask", options.get(f"{name}_mask"), n)
-        if options.get(name) is None:
+        if name not in options:
             if f"{name}_mask" in options:
                 raise ValueError(f'options["{name}_mask"] requires options["{name}"]')
             continue
@@ -248,7 +286,7 @@ def _checked_options(
         if values.shape not in ((size,), (n, size)) or values.dtype.kind not in "fiu":
             raise ValueError(
                 f'options["{name}"] must be numbers of the shape ({size},) or ({n}, {size}), got '
-                f"{options[name]!r}"
+                f"{shown(options[name])}"
             )
         for row in np.flatnonzero(mask).tolist():
             places[row][name] = values if values.ndim == 1 else values[row]
@@ -283,7 +321,7 @@ def checked_mask(name: str, mask: object, n: int) -> BoolArray:
     if mask is None:
         return np.ones(n, np.bool_)
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-        raise TypeError(f'options["{name}"] must be an array of bools, got {mask!r}')
+        raise TypeError(f'options["{name}"] must be an array of bools, got {shown(mask)}')
     if mask.shape != (n,):
         raise ValueError(f'options["{name}"] must have the shape ({n},), got {mask.shape}')
     return mask
@@ -297,13 +335,16 @@ def checked_seeds(seed: int | Sequence[int | None] | None, n: int) -> list[int |
         n: Number of environments.
 
     Raises:
-        ValueError: There is another number of seeds.
+        ValueError: There is another number of seeds, or a seed is no integer of at least 0.
     """
     if seed is None:
         return [None] * n
-    if isinstance(seed, int | np.integer):
-        return [int(seed) + i for i in range(n)]
-    seeds = list(seed)
-    if len(seeds) != n:
-        raise ValueError(f"there must be a seed for each of the {n} environments, got {len(seeds)}")
-    return seeds
+    if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str | bytes):
+        seeds = list(seed)
+        if len(seeds) != n:
+            raise ValueError(
+                f"there must be a seed for each of the {n} environments, got {len(seeds)}"
+            )
+        return [None if each is None else checked_count("each seed", each, 0) for each in seeds]
+    first = checked_count("seed", seed, 0)
+    return [first + i for i in range(n)]

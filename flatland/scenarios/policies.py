@@ -55,7 +55,8 @@ def file_controller(file: Path | None) -> Callable[[Task], Controller]:
 
     The laser may differ from that of the training: the hits of its scan become the ranges of the
     beams of the training, of which those without a hit have the greatest range. For a robot of
-    another radius, the ranges are changed by the difference.
+    another radius, the ranges are changed by the difference. A run whose period is not the
+    duration of an action in the training is a `PolicyError`.
 
     Args:
         file: The file; None for the included policy.
@@ -70,6 +71,7 @@ def file_controller(file: Path | None) -> Callable[[Task], Controller]:
 
 def _follow_file(file: Path | None, task: Task) -> Controller:
     policy = Policy(file)  # of its own, because it has a state
+    policy.check_period(task.period)
     robot = policy.robot
     view = functools.partial(
         _ranges_of_hits, robot.beams, robot.max_range, task.radius - robot.radius

@@ -16,7 +16,7 @@ from typing import Final, cast
 import numpy as np
 from aiohttp import WSCloseCode, web
 
-from flatland.checks import checked_count
+from flatland.checks import checked_count, checked_range
 from flatland.defaults import WEB_HOST, WEB_PORT
 from flatland.errors import FlatlandError
 from flatland.geometry import IDENTITY, FloatArray
@@ -87,7 +87,8 @@ class WebViewer:
         Raises:
             ValueError: The port is out of range, a token is too short, or both are equal.
         """
-        port = checked_count("port", port, 0, 65535)
+        checked_range("port", port, 0, 65535)
+        port = checked_count("port", port, 0)
         self._access = Access.for_host(host, token, view_token, read_only=read_only)
         self._port = port
         self._embeddable = embeddable

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import pytest
+from wrong_values import HUGE, INTERNAL, NO_COUNTS, NO_NUMBERS, NO_PATHS, NO_POSES
 
 from flatland import DynamicsLimits, FlatlandError, ModelSpec, Timekeeper, Twist, UpdateTimer, World
 from flatland.checks import quoted, shown
@@ -19,12 +19,6 @@ from flatland.runtime.batch import step_worlds
 from flatland.simulation import Simulation
 from flatland.worldgen import generate, maze
 
-HUGE: Final = 10**400
-NO_NUMBERS: Final = ("3", True, None, [1], 1j, b"1", {"a": 1}, np.array([1.0, 2.0]))
-NO_COUNTS: Final = (*NO_NUMBERS, -1, 1.5, math.nan, -HUGE, np.float64(2.0))
-NO_POSES: Final = ("123", ("1", 2, 3), (1, 2, 3, 4), (1j, 0, 0), (True, 0, 0), None, 5, {1, 2, 3},
-                   (HUGE, 0, 0), (math.nan, 0, 0), np.eye(3), ([1], 2, 3))  # fmt: skip
-NO_PATHS: Final = (None, 5, [1], b"a")
 TEXT: Final = "{bodies: [{name: b, footprints: []}]}"
 
 Call = Callable[[World, Any], object]
@@ -206,11 +200,6 @@ TABLE: list[tuple[str, Call, str, Sequence[Any]]] = [
     ("worldgen radius", lambda _, v: maze(1, radius=v), "radius", (*NO_NUMBERS, 5, HUGE)),
     ("Replay", lambda _, v: Replay(v), "path", (*NO_PATHS, "a\0b")),
 ]
-# The texts of Python itself and of pybind11.
-INTERNAL: Final = re.compile(
-    r"object (is|has|of)|not supported between|incompatible function|cannot convert|expected str"
-    r"|unpack|invalid literal|could not convert|must be real number|too large to|can't"
-)
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gymnasium.error import ResetNeeded
 
 from flatland import worldgen
 from flatland.gym import (
+    DiscreteAction,
     FixedGoal,
     FlatlandEnv,
     FlatlandVectorEnv,
@@ -23,6 +25,7 @@ from flatland.gym import (
     included_robot,
 )
 from flatland.gym.controllers import CONTROLLERS, DynamicWindow, Gap, Straight
+from flatland.gym.episodes import Episodes
 
 Make = Callable[..., Any]
 
@@ -142,3 +145,27 @@ def test_an_invalid_argument_is_an_error(make: Make) -> None:
         evaluate(Gap(envs), make(FlatlandVectorEnv, 1, "corridor"), 1)
     with pytest.raises(ValueError, match="episodes"):
         evaluate(Gap(envs), envs, 0)
+
+
+@pytest.mark.parametrize(("n", "episodes"), [(3, 7), (4, 2), (1, 2)])
+def test_no_other_episodes_begin(
+    make: Make, monkeypatch: pytest.MonkeyPatch, n: int, episodes: int
+) -> None:
+    begun = []
+    begin = Episodes.begin
+    monkeypatch.setattr(Episodes, "begin", lambda self, *a: (begun.append(a[0]), begin(self, *a)))
+    envs = make_envs(make, n, max_steps=20)
+    outcomes = evaluate(Gap(envs), envs, episodes, seed=3)
+    assert len(begun) == episodes == len(outcomes.steps)
+    with pytest.raises(ResetNeeded, match="no episode has begun"):
+        envs.step(np.zeros((n, 2)))
+    many = make_envs(make, 5, max_steps=20)
+    for name in ("is_success", "collision", "steps"):
+        other = getattr(evaluate(Gap(many), many, episodes, seed=3), name)
+        np.testing.assert_array_equal(getattr(outcomes, name), other)
+
+
+def test_an_evaluation_of_discrete_actions_with_idle_environments(make: Make) -> None:
+    action = DiscreteAction([(1.0, 0.0), (0.0, 1.0)])
+    envs = make_envs(make, 3, max_steps=4, action=action)
+    assert evaluate(lambda _: [0, 1, 1], envs, 1).steps.tolist() == [4]

@@ -266,7 +266,7 @@ def test_a_task_without_places_is_an_error(make: Make) -> None:
 def test_a_place_that_is_taken_is_refused(make: Make) -> None:
     env = make(world="corridor")
     for options, error, message in (
-        ({"begin": (1, 1, 0)}, ValueError, "goal and start, got begin"),
+        ({"begin": (1, 1, 0)}, ValueError, "goal, start, got begin"),
         ({"start": (1, 1)}, ValueError, "three numbers"),
         ({"start": (3.3, 0.5, 0)}, flatland.WorldError, "start .* cannot be reached: no path"),
         ({"goal": (60, 0)}, flatland.WorldError, r"goal .* outside of the walls, .*\(10, 2.5\)"),

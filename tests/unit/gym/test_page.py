@@ -44,3 +44,12 @@ def test_the_page_names_all_parts() -> None:
             assert (
                 name in ("AnyOf", "RandomizationSum") or f"`{name}(" in text or f"{name}`" in text
             ), name
+
+
+def test_the_pages_agree_about_the_time_of_training(checkout: Path) -> None:
+    time = "in about two minutes of processor time"
+    assert all(
+        time in " ".join(page.read_text().split()) for page in (PAGE, checkout / "README.md")
+    )
+    rows = re.findall(r"\| [1-5] .*\| ([0-9.]+) min \|", PAGE.read_text())
+    assert {round(float(minutes)) for minutes in rows} == {2}

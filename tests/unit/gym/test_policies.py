@@ -88,3 +88,13 @@ def test_invalid_files_are_errors(
     with pytest.raises(PolicyError, match=message) as caught:
         Policy(path)
     assert str(path) in str(caught.value)
+
+
+def test_another_duration_of_actions_is_refused(make: Make) -> None:
+    envs = make(FlatlandVectorEnv, 1, autoreset_mode="SAME_STEP", physics_steps=100)
+    with pytest.raises(PolicyError, match=r"trained with actions of 0\.1 s, here they last 0\.5 s"):
+        evaluate(Policy(), envs, 1)
+    with pytest.raises(PolicyError, match=r"dt=0\.1.* dt=0\.5"):
+        Policy(env=envs)
+    same = make(FlatlandVectorEnv, 1, autoreset_mode="SAME_STEP", physics_steps=10, step_size=0.01)
+    assert len(evaluate(Policy(), same, 1).steps) == 1

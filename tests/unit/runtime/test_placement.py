@@ -411,7 +411,7 @@ def test_a_place_that_just_fits_is_found(world: flatland.World) -> None:
         (lambda w: w.is_free((0, 0), model="x"), WorldError, 'model with name "x" does not exist'),
         (lambda w: w.is_free((0, 0), 1, ignore="x"), WorldError, 'model with name "x" does not'),
         (lambda w: w.is_free((0, 0), 1, layers="x"), WorldError, 'layer with name "x" does not'),
-        (lambda w: w.sample_free(-1, 0.3), ValueError, "n must be an integer from 0"),
+        (lambda w: w.sample_free(-1, 0.3), ValueError, "n must be an integer of at least 0"),
         (lambda w: w.sample_free(1, 0), ValueError, "radius must be positive"),
         (lambda w: w.sample_free(1, math.nan), ValueError, "radius must be positive"),
         (lambda w: w.sample_free(1, 0.3, -0.1), ValueError, "clearance must be finite and not neg"),

@@ -90,3 +90,9 @@ def test_hits_become_the_ranges_of_another_laser():
     ranges, max_range = _ranges_of_hits(8, 6.0, 0.1, scan)
     assert max_range == 6.0
     np.testing.assert_allclose(ranges, [0.9, 6, 2.9, 6, 1.4, 6, 6, 6], atol=1e-4)
+
+
+def test_another_period_than_that_of_the_training_is_an_error(run):
+    row = run("goal: [5, 5]\nrobot: {period: 0.5}", "policy").row
+    assert row["outcome"] == "error"
+    assert "was trained with actions of 0.1 s, here they last 0.5 s" in row["error"]

@@ -177,8 +177,8 @@ def test_an_existing_folder_is_not_changed(tmp_path: Path) -> None:
     ("arguments", "message"),
     [
         ({"kind": "castle"}, "kind must be one of office, maze, warehouse, got 'castle'"),
-        ({"seed": -1}, "seed must be an integer from 0 to"),
-        ({"seed": 1.5}, "seed must be an integer from 0 to"),
+        ({"seed": -1}, "seed must be an integer of at least 0"),
+        ({"seed": 1.5}, "seed must be an integer of at least 0"),
         ({"size": (11, 9)}, "size of a random office must be at least 12 x 10 m, got 11 x 9 m"),
         ({"size": (9, 60)}, "at least 12 x 10 m, got 9 x 60 m"),
         ({"size": (600, 20)}, "size must be at most 500 m along each side, got 600 x 20 m"),
