@@ -296,6 +296,7 @@ class FlatlandPlugin:
 
         Raises:
             ValueError: The phase is unknown, or the rate is negative or NaN.
+            TypeError: One of the outputs is no `Output`.
             PluginError: `on_initialize` has returned.
         """
         self._check_initializing("on_update")

@@ -185,7 +185,7 @@ class Output(Generic[T]):
 
         Returns:
             A function that ends this subscription; further calls have no effect. A subscription
-            that a plugin makes also ends with the plugin.
+            that a plugin makes in `on_initialize`, or one of its methods, also ends with it.
 
         Raises:
             TypeError: `callback` is no function.

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
+from flatland.plugin_api.ports import Output
+
 if TYPE_CHECKING:
     from flatland.entities.body import Body
     from flatland.geometry import Pose
     from flatland.physics import Touches
-    from flatland.plugin_api.ports import Output
     from flatland.plugin_api.update_timer import UpdateTimer
     from flatland.timekeeper import Timekeeper
 
@@ -87,16 +88,20 @@ class Update:
         self.at_touches = at_touches
         self.prepare = prepare
         self.on_change: Callable[[], None] | None = None
-        self._outputs = None if outputs is None else tuple(outputs)
+        self._outputs = _checked_outputs(outputs)
 
     @property
     def outputs(self) -> tuple[Output[Any], ...] | None:
-        """Outputs that the function computes; None if it is always called. Settable."""
+        """Outputs that the function computes; None if it is always called. Settable.
+
+        Raises:
+            TypeError: One of them is no `Output`.
+        """
         return self._outputs
 
     @outputs.setter
     def outputs(self, outputs: Iterable[Output[Any]] | None) -> None:
-        self._outputs = None if outputs is None else tuple(outputs)
+        self._outputs = _checked_outputs(outputs)
         if self.on_change is not None:
             self.on_change()
 
@@ -109,6 +114,16 @@ class Update:
         if self._outputs is None or (self.transforms and transforms_wanted):
             return True
         return any(output.wanted for output in self._outputs)
+
+
+def _checked_outputs(outputs: Iterable[Output[Any]] | None) -> tuple[Output[Any], ...] | None:
+    if outputs is None:
+        return None
+    checked = tuple(outputs)
+    for each in checked:
+        if not isinstance(each, Output):
+            raise TypeError(f"outputs must contain outputs of the plugin, got {each!r}")
+    return checked
 
 
 def when_due(hook: H) -> H:

@@ -54,6 +54,11 @@ class FrameSenders:
                 _warn(child, other, new)
         senders.append(new)
 
+    def has(self, frames: FramePair) -> bool:
+        """Returns whether a plugin sends a pair of frames."""
+        parent, child = frames
+        return any(sender[0] == parent for sender in self._senders.get(child, ()))
+
     def remove(self, plugin: FlatlandPlugin, frames: FramePair) -> None:
         """Removes a pair of frames that was added."""
         parent, child = frames

@@ -236,22 +236,34 @@ class Observers:
     def watch_steps(self) -> bool:
         """Whether an observer is to be notified of each step."""
         # A generator expression takes longer than a short step.
-        for observer in self._of_steps:  # noqa: SIM110
-            if observer.watches_steps:
-                return True
+        for observer in self._of_steps:
+            try:
+                if observer.watches_steps:
+                    return True
+            except PLUGIN_FAULTS as error:
+                self._take(observer, "watches_steps", error)
         return False
 
     @property
     def watch_time(self) -> bool:
         """Whether an observer is to be notified of the time without delay."""
-        return any(observer.watches_time for observer in self._of_time)
+        for observer in self._of_time:
+            try:
+                if observer.watches_time:
+                    return True
+            except PLUGIN_FAULTS as error:
+                self._take(observer, "watches_time", error)
+        return False
 
     @property
     def want_transforms(self) -> bool:
         """Whether an observer wants the transforms of this step."""
-        for observer in self._of_transforms:  # noqa: SIM110 - as for `watch_steps`
-            if observer.wants_transforms:
-                return True
+        for observer in self._of_transforms:  # as for `watch_steps`
+            try:
+                if observer.wants_transforms:
+                    return True
+            except PLUGIN_FAULTS as error:
+                self._take(observer, "wants_transforms", error)
         return False
 
     def step_started(self) -> None:
@@ -277,10 +289,14 @@ class Observers:
         """
         batch: Sequence[Transform] | None = None
         for observer in self._of_transforms:
-            if observer.wants_transforms:
-                if batch is None:
-                    batch = make_batch()
-                self._call(observer, "transforms_sent", batch)
+            try:
+                if not observer.wants_transforms:
+                    continue
+            except PLUGIN_FAULTS:
+                continue  # It was recorded by `want_transforms`.
+            if batch is None:
+                batch = make_batch()
+            self._call(observer, "transforms_sent", batch)
 
     def plugin_ros(self, plugin: FlatlandPlugin) -> Any:
         """Returns what the first observer that provides anything returns, None if none does."""
@@ -299,10 +315,13 @@ class Observers:
         try:
             getattr(observer, method)(*arguments)
         except PLUGIN_FAULTS as error:
-            what = f"observer {type(observer).__name__}: {method}"
-            self._faults.add((id(observer), method), what, error)
+            self._take(observer, method, error)
         finally:
             self.is_notifying = outer
+
+    def _take(self, observer: WorldObserver, method: str, error: BaseException) -> None:
+        what = f"observer {type(observer).__name__}: {method}"
+        self._faults.add((id(observer), method), what, error)
 
 
 def _overrides(observer: WorldObserver, method: str) -> bool:

@@ -68,8 +68,9 @@ class TransformBuffer:
         """Drops the transforms of a plugin that ended."""
         for pair in frames:
             self._senders.remove(plugin, pair)
-            self._latest.pop(pair, None)
-            self._pending.pop(pair, None)
+            if not self._senders.has(pair):
+                self._latest.pop(pair, None)
+                self._pending.pop(pair, None)
 
     def flush(self) -> None:
         """Publishes the transforms of this step."""

@@ -118,3 +118,16 @@ def test_a_plugin_may_change_the_parent_of_a_frame(files, empty_world, caplog):
     for parent in ("shelf", "gripper", "shelf"):
         plugin.send_transform(parent, "box", 0.0, 0.0, 0.0)
     assert warnings(caplog) == []
+
+
+def test_a_transform_remains_while_a_plugin_sends_it(files, empty_world):
+    path = model(files, "m", "{name: tf, type: ModelTfPublisher}")
+    for name in ("one", "two"):
+        empty_world.spawn_model(path, name)
+    empty_world.step()
+    frames = set(empty_world.transforms)
+    assert frames
+    empty_world.delete_model("one")
+    assert set(empty_world.transforms) == frames
+    empty_world.delete_model("two")
+    assert empty_world.transforms == {}

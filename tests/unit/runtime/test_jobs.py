@@ -67,6 +67,20 @@ class Immediate(ModelPlugin):
         self.seen.append(("second", timekeeper.sim_time_ns))
 
 
+class Mistaken(ModelPlugin):
+    """Declares an update for outputs that are none, in `on_initialize` or later."""
+
+    is_late = False
+
+    def on_initialize(self, config: Any) -> None:
+        self.output_ = self.output("o", float)
+        outputs: Any = [self.output_] if self.is_late else [None]
+        self.update = self.on_update(self.change, outputs=outputs)
+
+    def change(self, timekeeper: Any) -> None:
+        self.update.outputs = [self.output_, None]  # type: ignore[list-item]
+
+
 class Grouped(ModelPlugin):
     """Has updates that are prepared together, by a function of its own."""
 
@@ -82,7 +96,7 @@ class Grouped(ModelPlugin):
 @pytest.fixture(autouse=True)
 def _plugins(declare_plugins: Callable[..., None]) -> None:
     """Declares the plugins of this module."""
-    declare_plugins(Repeating, Lazy, Mutual, Immediate, Grouped)
+    declare_plugins(Repeating, Lazy, Mutual, Immediate, Grouped, Mistaken)
 
 
 def plugin_of(world: flatland.World) -> Any:
@@ -140,3 +154,15 @@ def test_groups_of_updates_end_with_the_last_of_their_plugins(files: Any) -> Non
     assert list(jobs._groups) == [second.prepare]
     world.step(3)
     assert (first.prepared, second.prepared) == (3, 6)
+
+
+def test_an_update_takes_outputs_only(files: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(flatland.PluginError, match="outputs must contain outputs of the plugin"):
+        files.load_model(MODEL.format("Mistaken"))
+    monkeypatch.setattr(Mistaken, "is_late", True)
+    world = files.load_model(MODEL.format("Mistaken"))
+    with pytest.raises(TypeError, match="outputs must contain outputs of the plugin, got None"):
+        world.step()
+    world.step()
+    assert world.time == pytest.approx(0.01)
+    assert plugin_of(world).update.outputs == (plugin_of(world).output_,)

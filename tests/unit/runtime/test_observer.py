@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from flatland import FlatlandError, World, WorldObserver
+from flatland.simulation import Simulation
 
 ROBOT = """
 bodies: [{name: base, footprints: [{type: circle, radius: 0.2, density: 1}]}]
@@ -135,3 +136,24 @@ def test_a_rejected_port_fails_the_model_and_other_observers_are_notified(
         load(files, good, bad)
     closed = event.replace("opened", "closed")
     assert good.events.count(event) == good.events.count(closed) > 0
+
+
+@pytest.mark.parametrize("name", ["watches_steps", "watches_time", "wants_transforms"])
+def test_an_exception_of_a_property_does_not_interrupt_a_step(
+    files: Any, caplog: pytest.LogCaptureFixture, name: str
+) -> None:
+    def fail(_: object) -> bool:
+        raise RuntimeError("no answer")
+
+    unattended = {"watches_steps": False}
+    watcher = type("Watcher", (Recorder,), {**unattended, name: property(fail)})()
+    other = type("Other", (Recorder,), unattended)()
+    world = load(files, watcher, other, plugin_errors="disable")
+    Simulation(world, update_rate=0).run(0.025)
+    assert world.time == pytest.approx(0.025)
+    assert "transforms_sent" in other.events
+    if name != "watches_time":  # which is read in real time only
+        assert f"observer Watcher: {name} raised" in caplog.text
+    Simulation(world, update_rate=1000).run(0.025)
+    assert f"observer Watcher: {name} raised" in caplog.text
+    assert world.time == pytest.approx(0.05)
