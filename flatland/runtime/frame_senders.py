@@ -82,21 +82,25 @@ def _are_in_conflict(first: _Sender, second: _Sender) -> bool:
 
 
 def _warn(child: str, first: _Sender, second: _Sender) -> None:
-    origins = [describe(each[1]) + each[1]._place.suffix for each in (first, second)]
+    plugins = (first[1], second[1])
+    origins = [describe(plugin) + plugin._place.suffix for plugin in plugins]
+    models = [getattr(plugin, "model", None) for plugin in plugins]
     if first[0] == second[0]:
         problem = f'is sent with two poses in "{first[0]}", by {origins[0]} and by {origins[1]}'
-        remedy = "give the frames different names or the models different namespaces"
     else:
         problem = f'has two parents, "{first[0]}" from {origins[0]} and "{second[0]}" from '
         problem += origins[1]
-        remedy = "give the frames different names"
-    switches = [f'"{each[3]}" of "{each[1].name}"' for each in (first, second) if each[3]]
-    keys = f" ({' or '.join(dict.fromkeys(switches))})" if switches else ""
+    remedies = []
+    if None not in models and models[0] is not models[1]:
+        names = " and ".join(f'"{model.name}"' for model in models if model is not None)
+        remedies.append(f"give the models {names} different namespaces")
+    remedies.append("give the frames different names")
+    # An entry of a file of both models would disable both.
+    if len({(plugin._place, plugin.name) for plugin in plugins}) == 2:
+        switches = [f'"{each[3]}" of "{each[1].name}"' for each in (first, second) if each[3]]
+        keys = f" ({' or '.join(dict.fromkeys(switches))})" if switches else ""
+        remedies.append(f"disable one of the senders{keys}")
+    remedy = ", ".join(remedies[:-1]) + f", or {remedies[-1]}" if remedies[1:] else remedies[0]
     _LOG.warning(
-        'TF frame "%s" %s; %s, or disable one of the senders%s',
-        child,
-        problem,
-        remedy,
-        keys,
-        extra={"place": second[1]._place},
+        'TF frame "%s" %s; %s', child, problem, remedy, extra={"place": second[1]._place}
     )
