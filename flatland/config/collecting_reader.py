@@ -329,7 +329,7 @@ class CollectingReader(YamlReader):
             if hints.did_you_mean(key, misspelled):
                 continue  # part of the error about the missing key
             message = f'Entry {self._label()}contains unrecognized entry(s) {{"{key}"}}'
-            hint = hints.unknown_key(key, known)
+            hint = hints.unknown_key(key, known, self.name)
             self._collector.add(self._strict()._error(message, node.key_lines[key], hint))
 
     # -- errors of the caller --------------------------------------------------------------

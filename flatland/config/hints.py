@@ -11,6 +11,7 @@ from pathlib import Path
 
 from flatland.config.files import IMAGE_SUFFIXES
 from flatland.config.foreign_files import escape_error, foreign_path
+from flatland.config.plugin_parameters import owners_of
 from flatland.suggestions import did_you_mean as did_you_mean
 from flatland.suggestions import question, similar_names
 
@@ -94,15 +95,19 @@ _NAN_ANGLE = (
 )
 
 
-def unknown_key(key: str, known: Iterable[str]) -> str:
+def unknown_key(key: str, known: Iterable[str], name: str = "") -> str:
     """Returns a hint for a key that is not used.
 
     Args:
         key: The key.
         known: Keys that are not in the map but would have been used.
+        name: Name of the map in error messages.
     """
     if key.isdigit():
         return "decimals are written with a point, as in 0.5"
+    owners = owners_of(key) if name.lower().startswith("plugin") else []
+    if owners:  # A key of another plugin is no misspelling of one of this plugin.
+        return f'"{key}" is a parameter of {" and ".join(owners)}'
     known = sorted(known)
     similar = did_you_mean(key, known)
     if similar or key.lower() in _UNKNOWN_KEYS:
@@ -117,7 +122,7 @@ def missing_key(key: str, unread: dict[str, int]) -> str:
         key: The key.
         unread: Lines of the keys of the map that have not been read.
     """
-    similar = similar_names(key, unread)
+    similar = similar_names(key, [each for each in unread if not owners_of(each)])
     if similar:
         return f'"{similar[0]}" in line {unread[similar[0]]} may be a misspelling of "{key}"'
     return _MISSING_KEYS.get(key, "")

@@ -270,7 +270,8 @@ class YamlReader:
         if unread and isinstance(self._node, MapNode):
             names = ", ".join(f'"{key}"' for key in sorted(unread))
             message = f"Entry {self._label()}contains unrecognized entry(s) {{{names}}}"
-            hint = hints.unknown_key(unread[0], self._accessed - set(self._node.entries))
+            known = self._accessed - set(self._node.entries)
+            hint = hints.unknown_key(unread[0], known, self.name)
             raise self._error(message, self._node.key_lines[unread[0]], hint)
 
     def error(self, message: str, hint: str = "") -> YamlError:

@@ -6,7 +6,10 @@ The plugins of forks are written in C++ and cannot be loaded, but public model f
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import Final
+
+from flatland.config.plugin_parameters import REQUIRED, foreign_keys
 
 _PEDESTRIANS: Final = (
     "use the world plugin Pedestrians, which does not need pedsim_ros; with pedsim_ros, a Python "
@@ -44,16 +47,46 @@ ALTERNATIVES: Final = {
     "RadiationSourceWorld": _RADIATION,
     "RadiationSensor": _RADIATION,
 }
+_SUBSTITUTES: Final = {
+    "PosePub": ("PosePublisher",),
+    "RandomMove": ("PathFollower",),
+    "RandomWandering": ("PathFollower",),
+    "Tween2": ("Tween", "PathFollower"),
+    "DiffDrive2": ("DiffDrive",),
+    "Diff_drive": ("DiffDrive",),
+    "SingleTrackDrive": ("AckermannDrive", "TricycleDrive"),
+    "Holo": ("OmniDrive",),
+    "HoloSecondOrder": ("OmniDrive",),
+}
+"""Included plugins that can replace a plugin of a fork if they have its parameters."""
+_SUBSTITUTES_BY_NAME: Final = {name.lower(): names for name, names in _SUBSTITUTES.items()}
 _BY_NAME: Final = {name.lower(): text for name, text in ALTERNATIVES.items()}
 
 
-def alternative_to(type_name: str) -> str:
+def alternative_to(type_name: str, keys: Iterable[str] = ()) -> str:
     """Returns what to use instead of a plugin of a fork.
+
+    A plugin is offered only if it has all parameters that are given.
 
     Args:
         type_name: Value of `type:` in a YAML file; its package and case are ignored.
+        keys: Keys of the entry of the plugin.
 
     Returns:
         A text for an error message, empty if the name is not known.
     """
-    return _BY_NAME.get(re.split(r"::|[/.]", type_name)[-1].lower(), "")
+    name = re.split(r"::|[/.]", type_name)[-1].lower()
+    text, keys = _BY_NAME.get(name, ""), set(keys)
+    substitutes = _SUBSTITUTES_BY_NAME.get(name, ())
+    foreign = [foreign_keys(substitute, keys) for substitute in substitutes]
+    fitting = [each for each, rest in zip(substitutes, foreign, strict=True) if not rest]
+    if not substitutes:
+        return text
+    if not fitting:
+        names = ", ".join(f'"{key}"' for key in min(foreign, key=len))
+        return f"no included plugin for its purpose has the parameters {names}"
+    # The plugin that misses the fewest parameters, in the order of the table.
+    best = min(fitting, key=lambda each: bool(keys) * len(REQUIRED[each] - keys))
+    text = text if best in text else f"use {best}"
+    missing = sorted(REQUIRED[best] - keys) if keys else []
+    return f"{text}; it also requires {' and '.join(missing)}" if missing else text

@@ -55,12 +55,14 @@ class PluginEntry:
         type_name: Value of `type:`.
         place: File and line of the entry.
         model: Name of the model, None for a world plugin.
+        keys: Keys of the entry.
     """
 
     name: str
     type_name: str
     place: Place
     model: str | None
+    keys: tuple[str, ...] = ()
 
 
 def read_entries(entries: Iterable[YamlReader], model: str | None) -> list[PluginEntry]:
@@ -74,7 +76,13 @@ def read_entries(entries: Iterable[YamlReader], model: str | None) -> list[Plugi
         YamlError: An entry has no name or type.
     """
     return [
-        PluginEntry(entry.get("name", "string"), entry.get("type", "string"), entry.place, model)
+        PluginEntry(
+            entry.get("name", "string"),
+            entry.get("type", "string"),
+            entry.place,
+            model,
+            tuple(entry.keys()),
+        )
         for entry in entries
         if entry.get("enabled", "bool", True)
     ]
@@ -105,8 +113,8 @@ class LookupHints:
                 if export.tag != PYTHON_TAG:  # errors of the others are in `problems`
                     self._problems.append(error)
 
-    def describe(self, type_name: str) -> str:
-        """Returns a text about one `type:` of a YAML file.
+    def describe(self, type_name: str, keys: Iterable[str] = ()) -> str:
+        """Returns a text about one `type:` of a YAML file, of an entry with some keys.
 
         The text contains similar known names, the packages that export a C++ plugin of that name,
         and what to use instead of a plugin of a known fork of the reference.
@@ -123,7 +131,7 @@ class LookupHints:
         places = self._reference_plugins.get(name) or self._reference_plugins.get(type_name)
         if places:
             text += f"; a C++ plugin of that name is exported by {' and '.join(places)}"
-        alternative = alternative_to(type_name)
+        alternative = alternative_to(type_name, keys)
         if alternative:
             text += f"; forks of the reference have a plugin of that name: {alternative}"
         return text
@@ -148,18 +156,19 @@ class LookupHints:
         Args:
             entries: Entries of any models and of the world, at least one.
         """
-        models: dict[tuple[str, str, Place], list[str | None]] = {}
+        models: dict[tuple[str, str, Place, tuple[str, ...]], list[str | None]] = {}
         for entry in entries:
-            models.setdefault((entry.name, entry.type_name, entry.place), []).append(entry.model)
+            key = (entry.name, entry.type_name, entry.place, entry.keys)
+            models.setdefault(key, []).append(entry.model)
         missing = []
-        for (name, type_name, place), owners in models.items():
+        for (name, type_name, place, keys), owners in models.items():
             kind = "World" if owners[0] is None else "Model"
             text = f'{kind} Plugin "{name}" type "{type_name}"'
             if owners[0] is not None:
                 text += " model " + ", ".join(f'"{owner}"' for owner in owners)
-            text += f": {self.describe(type_name)}"
+            text += f": {self.describe(type_name, keys)}"
             missing.append(PluginError(text + place.suffix, place=place, hint=_HINT))
-        advice = self.advise({type_name for _, type_name, _ in models})
+        advice = self.advise({type_name for _, type_name, *_ in models})
         if len(missing) == 1:
             return MissingPluginsError(f"{text}; {advice}{place.suffix}", missing)
         texts = [*(error.message for error in missing), advice]

@@ -101,6 +101,4 @@ def _warn(child: str, first: _Sender, second: _Sender) -> None:
         keys = f" ({' or '.join(dict.fromkeys(switches))})" if switches else ""
         remedies.append(f"disable one of the senders{keys}")
     remedy = ", ".join(remedies[:-1]) + f", or {remedies[-1]}" if remedies[1:] else remedies[0]
-    _LOG.warning(
-        'TF frame "%s" %s; %s', child, problem, remedy, extra={"place": second[1]._place}
-    )
+    _LOG.warning('TF frame "%s" %s; %s', child, problem, remedy, extra={"place": second[1]._place})

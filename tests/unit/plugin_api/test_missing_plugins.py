@@ -9,7 +9,8 @@ from flatland_command import main
 
 import flatland
 from flatland import PluginError
-from flatland.plugin_api.fork_plugins import ALTERNATIVES
+from flatland.config.plugin_parameters import PARAMETERS, REQUIRED
+from flatland.plugin_api.fork_plugins import ALTERNATIVES, alternative_to
 from flatland.plugin_api.manifest import PORTING_GUIDE
 from flatland.plugin_api.missing_plugins import MissingPluginsError
 from flatland.plugin_api.registry import PluginRegistry
@@ -244,6 +245,70 @@ def test_a_cpp_class_with_a_base_class_of_flatland_is_reported(files, monkeypatc
 def test_alternatives_to_the_plugins_of_forks(type_name, advice):
     text = find_error(type_name).split("; forks of the reference have a plugin of that name: ")[1]
     assert advice in text
+
+
+WHEELS = ("front_wheel_joint", "rear_left_wheel_joint", "rear_right_wheel_joint")
+
+
+@pytest.mark.parametrize(
+    ("type_name", "keys", "advice"),
+    [
+        ("SingleTrackDrive", ("body", *WHEELS, "odom_pub"), "use TricycleDrive"),
+        ("SingleTrackDrive", ("body", "max_steer_angle", "wheelbase"), "use AckermannDrive"),
+        ("SingleTrackDrive", ("body",), "use AckermannDrive; it also requires max_steer_angle"),
+        (
+            "SingleTrackDrive",
+            ("body", *WHEELS, "target_twist_sub", "max_steering_angle"),
+            "no included plugin for its purpose has the parameters "
+            '"max_steering_angle", "target_twist_sub"',
+        ),
+        ("DiffDrive2", ("name", "type", "body", "twist_sub"), "use DiffDrive"),
+        (
+            "RandomMove",
+            ("body", "linear_velocity"),
+            'no included plugin for its purpose has the parameters "linear_velocity"',
+        ),
+    ],
+)
+def test_a_plugin_is_offered_only_if_it_has_the_parameters(type_name, keys, advice):
+    assert alternative_to(type_name, keys) == advice
+
+
+EXAMPLES = {
+    "AckermannDrive": "body: b, max_steer_angle: 0.5, wheelbase: 1",
+    "TricycleDrive": "body: b, front_wheel_joint: f, rear_left_wheel_joint: l, "
+    "rear_right_wheel_joint: r",
+    "DiffDrive": "body: b",
+    "OmniDrive": "body: b",
+    "PathFollower": "body: b, waypoints: [[1, 0]]",
+    "PosePublisher": "body: b",
+    "Tween": "body: b, delta: [1, 0, 0]",
+}
+
+
+@pytest.mark.parametrize("plugin", PARAMETERS)
+def test_the_table_of_parameters_is_that_of_the_plugins(plugin, files):
+    """Parameters that depend on others are not read here, and must be in the table only."""
+    joints = "".join(
+        f"- {{type: {kind}, name: {name}, bodies: [{{name: b, anchor: {anchor}}}, "
+        f"{{name: w, anchor: [0, 0]}}]}}\n"
+        for kind, name, anchor in (
+            ("revolute", "f", "[0, 0]"), ("weld", "l", "[-1, 1]"), ("weld", "r", "[-1, -1]")
+        )
+    )  # fmt: skip
+    path = files.write(
+        "m.yaml",
+        "bodies: [{name: b, footprints: []}, {name: w, footprints: []}]\n"
+        f"joints:\n{joints}"
+        f"plugins: [{{type: {plugin}, name: p, {EXAMPLES[plugin]}, unknown_key: 1}}]\n",
+    )
+    with flatland.World(seed=1) as world, pytest.raises(flatland.PluginError) as caught:
+        world.spawn_model(path, "m")
+    read = caught.value.__cause__.hint.removeprefix("other keys that are known here: ").split(", ")
+    given = re.findall(r"(\w+):", EXAMPLES[plugin])
+    assert set(read) <= PARAMETERS[plugin]
+    assert set(given) <= PARAMETERS[plugin]
+    assert REQUIRED[plugin] <= set(given)
 
 
 def test_other_names_have_no_alternative():
