@@ -184,6 +184,7 @@ def _run(
             if stack is not None:
                 stage = stack.start(run, stage, lambda: prepare(world, run))
             result.outline = outline_of(world)
+            result.models = models_of(world, stage.robot.name, ())
             result.goals = list(stage.task.goals)
             driver = _Driver(stage, create, begin_command)
             _drive(scenario, stage, driver, result)

@@ -56,6 +56,8 @@ def results():
     event = (0.5, 2.0, 1.5, "kidnap")
     recording = "recordings/a.flog"
     results.add(Result(bad, path[:2], [(9.0, 4.0)], [event], Outline("k", SQUARE), recording))
+    results.results[1].jumps = [(0.5, 1.5, 1.0, 2.0, 1.5)]
+    results.results[1].models = [("box", "hit", [[(2.0, 2.0), (3.0, 2.0), (2.0, 2.0)]])]
     results.add(Result(error_row(("t", "gap", 0), "no <way>")))
     return results
 
@@ -71,6 +73,10 @@ def test_results_are_read_as_they_were_written(results, tmp_path):
     assert found.lines_of(found.results[1]) == lines
     assert found.lines_of(found.results[2]) == []
     assert found.results[1].recording == "recordings/a.flog"
+    pictures = [run_picture(each.results[1], SQUARE) for each in (found, results)]
+    assert pictures[0] == pictures[1]
+    assert 'class="model hit"' in pictures[0]
+    assert 'class="jump"' in pictures[0]
     assert [tuple(point) for point in found.results[0].path] == results.results[0].path
     with (tmp_path / "results.csv").open() as file:
         table = list(csv.DictReader(file))
