@@ -205,9 +205,14 @@ def test_periods_are_whole_numbers_of_steps(run, room):
     # Steps take 5 ms.
     row = run("robot: {period: 0.0124}\nlimits: {time: 1}", "own.py:Own").row
     assert row["path_length"] == pytest.approx(0.01, abs=1e-3)
-    # The robot drives, also if a period is longer than the window of the time stuck.
-    text = "robot: {period: 5}\nlimits: {time: 12, stuck: 3}\ngoal: [5, 5]\ntolerance: 0.1"
-    assert run(text, "straight").row["outcome"] != "stuck"
+    # A period may be longer than the window of the time stuck.
+    text = "robot: {period: 5}\nlimits: {time: 30, stuck: 3}"
+    assert run(text, "straight").row["outcome"] == "reached"
+    (room / "still.py").write_text(
+        "import flatland\ndef stand(scan, pose, goal): return flatland.Twist()\n"
+    )
+    row = run(text, "still.py:stand").row
+    assert (row["outcome"], row["time"]) == ("stuck", 5.005)
 
 
 def test_the_models_at_the_end_are_drawn(run):
@@ -256,6 +261,8 @@ def test_a_kidnapping_is_no_part_of_the_path(run):
     # The shortest path consists of one to the place and one from there.
     assert row["shortest_path"] == pytest.approx(1.3 + 2.7, abs=0.02)
     assert row["spl"] == pytest.approx(1.0, abs=0.001)
+    row = run("events: [{near: [3.5, 5], radius: 0.2, kidnap: [2, 7, -0.5]}]").row
+    assert row["shortest_path"] == pytest.approx(1.3 + math.hypot(3, 2) - 0.3, abs=0.02)
 
 
 def test_an_event_after_a_goal(run):
