@@ -64,7 +64,10 @@ class FlatlandPlugin:
 
     base_class_type: ClassVar[str] = ""
     recorded_methods: ClassVar[frozenset[str]] = frozenset()
-    outside_state: ClassVar[dict[str, Callable[[], object]]] = {"ros": lambda: None}
+    outside_state: ClassVar[dict[str, Callable[[], object]]] = {
+        "_endings": list,
+        "ros": lambda: None,
+    }
 
     name: str
     type: str

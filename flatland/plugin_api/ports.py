@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import threading
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from flatland.checks import check_function, shown
@@ -193,13 +193,16 @@ class Output(Generic[T]):
         check_function("callback", callback)
         owner = None if self._find_owner is None else self._find_owner(callback)
         token = Token(owner)
+        self._add(token, callback, wants=wants)
+        return lambda: self.unsubscribe(token)
+
+    def _add(self, token: Token, callback: Callable[[T], None], *, wants: bool) -> None:
         with self._lock:
             self._subscribers = (*self._subscribers, (token, callback))
             if wants:
                 self._set_wanters(self._wanters | {token})
-        if owner is not None:
-            owner._call_at_end(lambda: self.unsubscribe(token))
-        return lambda: self.unsubscribe(token)
+        if token.owner is not None:
+            token.owner._call_at_end(lambda: self.unsubscribe(token))
 
     def unsubscribe(self, token: Token) -> None:
         """Ends a subscription; idempotent, and safe from any thread."""
@@ -217,12 +220,17 @@ class Output(Generic[T]):
         ]
 
     def resume(self, token: Token, callback: Callable[[T], None], *, wants: bool) -> None:
-        """Continues a subscription that may have ended."""
+        """Continues a subscription that has ended, or that is the copy of another one."""
         self.unsubscribe(token)
+        self._add(token, callback, wants=wants)
+
+    def sort(self, tokens: Sequence[Token]) -> None:
+        """Calls subscribers in the order of some tokens, after those of others."""
+        places = {id(token): place for place, token in enumerate(tokens)}
         with self._lock:
-            self._subscribers = (*self._subscribers, (token, callback))
-            if wants:
-                self._set_wanters(self._wanters | {token})
+            self._subscribers = tuple(
+                sorted(self._subscribers, key=lambda each: places.get(id(each[0]), -1))
+            )
 
 
 class CommandSource(Protocol[T_co]):

@@ -141,16 +141,12 @@ class Observers:
         self._call(observer, "detached")
 
     def add_of_plugin(self, observer: WorldObserver, owner: PortUser) -> None:
-        """Adds an observer that ends with a plugin."""
+        """Adds an observer that ends with a plugin; one that was added already is ignored."""
+        if observer in self._all:
+            return
         self.add(observer)
         self.of_plugins = (*self.of_plugins, (observer, owner))
         owner._call_at_end(lambda: self._end(observer))
-
-    def resume(self, observer: WorldObserver, owner: PortUser) -> None:
-        """Adds an observer again that ended with its plugin."""
-        if observer not in self._all:
-            self.add(observer)
-            self.of_plugins = (*self.of_plugins, (observer, owner))
 
     def _end(self, observer: WorldObserver) -> None:
         if observer in self._all:

@@ -134,9 +134,10 @@ class _Ports:
         for output, token, callback, wants in self.subscriptions:
             if token.owner in plugins:
                 output.resume(token, callback, wants=wants)
+                output.sort([other for of, other, *_ in self.subscriptions if of is output])
         for observer, owner in self.observers:
             if owner in plugins:
-                observers.resume(observer, owner)
+                observers.add_of_plugin(observer, owner)
 
 
 class Snapshots:
@@ -346,7 +347,7 @@ class Snapshots:
             _copy_subscriptions(output, copier)
         for pair in self._observers.of_plugins:
             made = _copied(pair, copier, f"the observer {type(pair[0]).__name__}")
-            clone._observers.resume(*made)
+            clone._observers.add_of_plugin(*made)
         clone._host.jobs.change()
 
     # -- errors ----------------------------------------------------------------------------
@@ -418,22 +419,18 @@ def _copy_subscriptions(output: Output[Any], copier: Copier) -> None:
         WorldError: A subscription cannot be copied.
     """
     copy = copier.find(output)
-    subscribers = []
     what = f'what wants the output "{output.topic}"'
     inner = frozenset(_copied(tuple(output._inner_wanters), copier, what))
-    wanters = {copier.find(who) for who in output._wanters} - {None}
+    copy._inner_wanters = inner
+    copy._wanters = inner | ({copier.find(who) for who in output._wanters} - {None})
     for token, callback in output._subscribers:
         if token.owner is None and copier.find(getattr(callback, "__self__", None)) is None:
             continue
         what = f'the subscription {callback_name(callback)} of output "{output.topic}"'
         if isinstance(token.owner, FlatlandPlugin):
             what = f"{describe(token.owner)}: {what}"
-        made = _copied((token, callback), copier, what)
-        subscribers.append(made)
-        if token in output._wanters:
-            wanters.add(made[0])
-    copy._subscribers, copy._wanters = tuple(subscribers), inner | wanters
-    copy._inner_wanters = inner
+        copied, function = _copied((token, callback), copier, what)
+        copy.resume(copied, function, wants=token in output._wanters)
 
 
 def _copied(original: T, copier: Copier, what: str) -> T:

@@ -796,19 +796,26 @@ def test_a_subscription_that_cannot_be_cloned_is_named(
 
 def test_what_a_plugin_has_connected_ends_and_returns_with_it(connected: Any) -> None:
     world = connected()
-    world.spawn_model(CONNECTED.format("Connecting"), "two", "two", pose=(3, 3, 0))
-    plugin = world.model("two").plugin("p")
+    for name in ("two", "three"):
+        world.spawn_model(CONNECTED.format("Connecting"), name, name, pose=(3, 3, 0))
+    output, plugin = world.ports.find_output("/scan"), world.model("two").plugin("p")
     world.step(2)
-    snapshot = world.snapshot()
+    snapshot, connections = world.snapshot(), output.of_plugins
+    assert len(connections) == 3 * 6
     world.step(10)
     expected = dict(plugin.counts)
     world.delete_model("two")
     world.step(10)
     assert plugin.counts == expected
-    assert len(world.ports.find_output("/scan").of_plugins) == 6
-    world.restore(snapshot)
-    assert len(world.ports.find_output("/scan").of_plugins) == 12
-    world.step(10)
-    assert plugin.counts == expected
+    for _ in range(2):
+        assert len(output.of_plugins) == 2 * 6
+        world.restore(snapshot)
+        assert output.of_plugins == connections  # in the same order
+        world.step(10)
+        assert plugin.counts == expected
+        world.delete_model("two")
+    with world.clone() as clone:
+        clone.delete_model("three")
+        assert len(clone.ports.find_output("/scan").of_plugins) == 6
     world.reset()
-    assert len(world.ports.find_output("/scan").of_plugins) == 6
+    assert len(output.of_plugins) == 6
