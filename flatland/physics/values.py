@@ -299,7 +299,7 @@ class Run(NamedTuple):
         dt: Simulated time of a step [s].
         velocity_iterations: Velocity iterations of the solver.
         position_iterations: Position iterations of the solver.
-        continues: Whether the step in which the last run has ended is completed, and no other one.
+        continues: Whether the first step is the one in which the last run has ended.
         calls_physics: Whether the caller performs the physics step.
     """
 

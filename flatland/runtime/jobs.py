@@ -198,6 +198,11 @@ class Jobs:
             if job.plugin in plugins:
                 job.was_called = True
 
+    def is_current(self, transforms_wanted: bool) -> bool:
+        """Returns whether `refresh` has nothing to do for the next step."""
+        has_calls = self._later or self._repeated
+        return not (self._is_stale or has_calls or transforms_wanted != self._transforms_wanted)
+
     def refresh(self, transforms_wanted: bool) -> bool:
         """Prepares the next step: passes new commands, and finds out which updates are wanted.
 

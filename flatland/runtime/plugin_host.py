@@ -262,6 +262,11 @@ class PluginHost:
             self.contacts.update()
         return self.jobs.refresh(transforms_wanted)
 
+    def is_prepared(self, transforms_wanted: bool) -> bool:
+        """Returns whether `prepare_step` has nothing to do."""
+        is_stale = self._unswept or self.contacts.is_stale
+        return not is_stale and self.jobs.is_current(transforms_wanted)
+
     def _sweep(self) -> None:
         """Removes the jobs and contact hooks of the plugins that were disabled."""
         while self._unswept:

@@ -122,13 +122,13 @@ class Stepping:
             n -= perform(self.run(n, while_paused=while_paused), self._queue.run)
 
     def step_up_to(self, n: int, pace: Pace | None = None) -> int:
-        """Steps at most n times: until code has been called or a request has been processed.
+        """Steps at most n times: until a request is to be processed.
 
         Args:
             n: Maximum number of steps, at least 1.
             pace: The times at which the steps are performed, the first one at once; its `times` are
-                set. The steps also end if one was late, and after 25 ms. None to perform the steps
-                as fast as possible.
+                set. The steps also end when code has been called, if one was late, and after 25 ms.
+                None to perform the steps as fast as possible.
 
         Returns:
             The number of steps; 1 for a paused world, 0 if a request came before the first step.
@@ -137,17 +137,19 @@ class Stepping:
             Exception: As `World.step`.
         """
         queue = self._queue
+        if pace is None:
+            return perform(self.run(n), queue.run)
 
         def run_paced(*arguments: Any) -> RunResult:
             run = Run(*arguments)
-            if pace is None or run.n == 1:
+            if run.n == 1:
                 return queue.run(*run)
             if self._observers.watch_time or pace.is_interrupted():
                 return queue.run(*run._replace(n=1))
             result, pace.times = queue.run_paced(run, pace.due, pace.period)
             return result
 
-        return perform(self.run(n), run_paced)
+        return perform(self.run(n, is_paced=True), run_paced)
 
     def prepare_unattended(self) -> bool:
         """Prepares runs that the core begins without any code before.
@@ -196,18 +198,21 @@ class Stepping:
         *,
         while_paused: bool = False,
         begun: RunResult | Exception | None = None,
+        is_paced: bool = False,
     ) -> StepRun:
         """Performs up to n steps, at least one unless another thread interrupts.
 
-        A run ends after a step in which code was called, and after an interrupt. Observers are
-        notified of its start and end, and of the time whenever code is called and at the end. With
-        an observer that watches single steps, and during a recording, a run is a single step.
+        Ends after an interrupt, for requests, and for faults that are raised. Observers are
+        notified of the end and the start of steps after each step in which code was called, and of
+        the time whenever code is called and at the end. With an observer that watches single steps,
+        and during a recording, they are notified of each step.
 
         Args:
             n: Maximum number of steps, at least 1.
             while_paused: Whether to step a paused world.
             begun: What the core returned or raised if it has performed the first part of the run;
                 else None.
+            is_paced: Whether to end after a step in which code was called.
 
         Returns:
             The run, to be driven by `perform` or `step_worlds`; its result is 1 for a paused world.
@@ -230,7 +235,7 @@ class Stepping:
                 with requests.hooks():
                     self._observers.step_started()
                     try:
-                        made = yield from self._steps(n, begun)
+                        made = yield from self._steps(n, begun, while_paused, is_paced)
                     finally:
                         self._observers.step_finished()
             if requests.actions:
@@ -239,11 +244,15 @@ class Stepping:
             self._faults.raise_first()
         return made
 
-    def _steps(self, n: int, begun: RunResult | Exception | None) -> StepRun:
+    def _steps(
+        self,
+        n: int,
+        begun: RunResult | Exception | None,
+        while_paused: bool,
+        is_paced: bool,
+    ) -> StepRun:
         world, host, timekeeper = self._world, self._host, self._timekeeper
-        is_single = self._observers.watch_steps or self.change_log is not None
-        if begun is None and host.prepare_step(self._observers.want_transforms):
-            is_single = True
+        is_single = (begun is None and self._prepare()) or self._is_watched
         start, step = timekeeper.sim_time_ns, timekeeper.step_size_ns
         run = Run(
             start,
@@ -257,29 +266,90 @@ class Stepping:
         )
         if isinstance(begun, Exception):
             raise begun
-        steps, end, calls, failed, report = begun or (yield run)
-        while end != _DONE:
-            is_after = end >= _AFTER
-            self._set_time(start + (steps + is_after) * step)
-            if failed:
-                host.jobs.failed(failed, is_after=is_after)
-            if calls:
-                host.call_updates(calls)
-            if end in (_PHYSICS, _AFTER_PHYSICS):
-                self._examine(report, calls_physics=end == _PHYSICS)
-            if end == _LAST_CALLS:
-                steps += 1
+        result = begun or (yield run)
+        made = notified = 0  # steps, and those of whose end observers were notified
+        has_called = False  # since then
+        while True:
+            steps, end, calls, failed, report = result
+            made += steps
+            start += steps * step
+            if end != _DONE:
+                if has_called and steps:
+                    self._set_time(start)
+                    self._between_steps()
+                    notified = made
+                    is_single = self._is_watched
+                has_called = True
+                is_after = end >= _AFTER
+                self._set_time(start + step if is_after else start)
+                if failed:
+                    host.jobs.failed(failed, is_after=is_after)
+                if calls:
+                    host.call_updates(calls)
+                if end in (_PHYSICS, _AFTER_PHYSICS):
+                    self._examine(report, calls_physics=end == _PHYSICS)
+                if end != _LAST_CALLS:
+                    # The core goes on with the next steps unless something else is to be done.
+                    goes_on = (
+                        not is_paced
+                        and not is_single
+                        and not self._has_to_end(while_paused)
+                        and host.is_prepared(self._observers.want_transforms)
+                    )
+                    run = run._replace(time=start, n=n - made if goes_on else 1, continues=True)
+                    result = yield run
+                    continue
+                made += 1
+                start += step
+            elif steps < run.n:
+                break  # by an interrupt, or after a long time
+            if made == n or is_paced or self._has_to_end(while_paused):
                 break
-            _, end, calls, failed, report = yield run._replace(
-                time=start + steps * step, n=1, continues=True
+            self._set_time(start)
+            self._between_steps()
+            notified = made
+            has_called = False
+            is_single = self._prepare() or self._is_watched
+            run = run._replace(
+                time=start,
+                n=1 if is_single else n - made,
+                continues=False,
+                calls_physics=self._physics.pre_solve is not None,
             )
-            if end == _DONE:
-                steps += 1
-        self._set_time(start + steps * step)
+            result = yield run
+        self._set_time(start)
+        self._end_step(has_stepped=made > notified)
+        return made
+
+    @property
+    def _is_watched(self) -> bool:
+        """Whether every step has to be reported to observers or to the change log."""
+        return self._observers.watch_steps or self.change_log is not None
+
+    def _has_to_end(self, while_paused: bool) -> bool:
+        """Returns whether a run has to end between two steps."""
+        world = self._world
+        return (
+            bool(self._requests.actions)
+            or self._faults.first is not None
+            or (world.paused and not while_paused)
+            or world.closed
+        )
+
+    def _prepare(self) -> bool:
+        """Prepares the next step; returns whether the one after it must be prepared as well."""
+        return self._host.prepare_step(self._observers.want_transforms)
+
+    def _end_step(self, *, has_stepped: bool) -> None:
         self._transforms.flush()
-        if self.change_log is not None and steps:
+        if self.change_log is not None and has_stepped:
             self.change_log.step_done()
-        return steps
+
+    def _between_steps(self) -> None:
+        """Notifies observers of the end of a step and of the start of the next one."""
+        self._end_step(has_stepped=True)
+        self._observers.step_finished()
+        self._observers.step_started()
 
     def _set_time(self, time_ns: int) -> None:
         if time_ns != self._timekeeper.sim_time_ns:

@@ -52,9 +52,7 @@ def pose_stamped(value: values.PoseStamped, to: Writer) -> None:
 
 def transform(value: values.Transform, to: Writer) -> None:
     """Writes a `geometry_msgs/TransformStamped`."""
-    to.header(value.stamp, value.parent)
-    to.text(value.child)
-    to.pose(value.x, value.y, value.yaw, value.roll)
+    to.stamped_pose(value.stamp, value.parent, value.child, value.x, value.y, value.yaw, value.roll)
 
 
 def transforms(value: node_values.Transforms, to: Writer) -> None:
@@ -135,9 +133,7 @@ def joint_state(value: values.JointState, to: Writer) -> None:
 
 def odometry(value: values.Odometry, to: Writer) -> None:
     """Writes a `nav_msgs/Odometry`."""
-    to.header(value.stamp, value.frame_id)
-    to.text(value.child_frame_id)
-    to.pose(*value.pose)
+    to.stamped_pose(value.stamp, value.frame_id, value.child_frame_id, *value.pose)
     to.covariance(value.pose_covariance, 6)
     to.twist(value.twist)
     to.covariance(value.twist_covariance, 6)

@@ -123,6 +123,21 @@ class Writer(ABC):
         """Writes the position (x, y, 0) and the rotation by `roll`, then `yaw` [rad]."""
         self.pack("d", x, y, 0.0, *quaternion_from_yaw(yaw, roll))
 
+    def stamped_pose(
+        self,
+        time_ns: int,
+        frame_id: str,
+        child: str,
+        x: float,
+        y: float,
+        yaw: float,
+        roll: float = 0.0,
+    ) -> None:
+        """Writes a header, the id of the child frame, and its pose as `pose` does."""
+        self.header(time_ns, frame_id)
+        self.text(child)
+        self.pose(x, y, yaw, roll)
+
     def twist(self, velocity: Pose) -> None:
         """Writes the planar velocity (vx, vy, omega)."""
         linear_x, linear_y, angular_z = velocity

@@ -73,6 +73,20 @@ class RosWriter(Writer):
         """Writes the position (x, y, 0) and the rotation by `roll`, then `yaw` [rad]."""
         self.data += _POSE.pack(x, y, 0.0, *quaternion_from_yaw(yaw, roll))
 
+    def stamped_pose(
+        self,
+        time_ns: int,
+        frame_id: str,
+        child: str,
+        x: float,
+        y: float,
+        yaw: float,
+        roll: float = 0.0,
+    ) -> None:
+        """Writes a header, the id of the child frame, and its pose as `pose` does."""
+        pose = _POSE.pack(x, y, 0.0, *quaternion_from_yaw(yaw, roll))
+        self.data += _header(message_stamp(time_ns)) + _text(frame_id) + _text(child) + pose
+
     def twist(self, velocity: Pose) -> None:
         """Writes the planar velocity (vx, vy, omega)."""
         linear_x, linear_y, angular_z = velocity

@@ -84,9 +84,16 @@ class Outbox:
                     self.dropped += 1
                 self._queue.append(data)
                 return
-            self._queue.append(data)
-            if not self._send():
-                _flusher().watch(self)
+            sent = self._send_part(data)
+            if sent:
+                self._transport.stat_num_msg += 1
+            if sent == len(data):
+                return
+            if sent:
+                self._partial = memoryview(data)[sent:]
+            else:
+                self._queue.append(data)
+            _flusher().watch(self)
 
     def disable_delay(self) -> None:
         """Disables the delay of small messages by the system, and sends waiting messages.
@@ -117,26 +124,33 @@ class Outbox:
 
     def _send(self) -> bool:
         """Sends queued messages until the socket would block; returns whether all were sent."""
-        connection: socket.socket | None = self._transport.socket
-        if connection is None or self._transport.done:
-            self._queue.clear()
-            raise TransportTerminated("connection closed")
         while self._partial is not None or self._queue:
             rest = self._partial
             if rest is None:
                 rest = memoryview(self._queue[0])
-            try:
-                sent = connection.send(rest)
-            except BlockingIOError:
+            sent = self._send_part(rest)
+            if not sent:
                 return False
-            except OSError as error:
-                raise TransportTerminated(str(error)) from error
-            self._transport.stat_bytes += sent
             if self._partial is None:
                 self._queue.popleft()
                 self._transport.stat_num_msg += 1
             self._partial = rest[sent:] if sent < len(rest) else None
         return True
+
+    def _send_part(self, data: bytes | memoryview) -> int:
+        """Sends a part of a message; returns the number of bytes that the socket has accepted."""
+        connection: socket.socket | None = self._transport.socket
+        if connection is None or self._transport.done:
+            self._queue.clear()
+            raise TransportTerminated("connection closed")
+        try:
+            sent = connection.send(data)
+        except BlockingIOError:
+            return 0
+        except OSError as error:
+            raise TransportTerminated(str(error)) from error
+        self._transport.stat_bytes += sent
+        return sent
 
     def _closed(self, transport: Any) -> None:
         """Stops watching the socket; called by rospy when the connection is closed."""

@@ -103,10 +103,10 @@ class Publisher:
         Args:
             message: The message, or its bytes, see `publish_serialized`.
         """
-        if self.closed:
-            return
         if isinstance(message, bytes):
             self.publish_serialized(message)
+            return
+        if self.closed:
             return
         publisher = self._publisher
         if publisher is None:
@@ -123,20 +123,13 @@ class Publisher:
             if not rospy.core.is_shutdown_requested():
                 raise
 
-    def publish_serialized(self, message: bytes) -> None:
+    def publish_serialized(self, message: bytes | Callable[[], bytes]) -> None:
         """Sends a serialized message to all subscribers, if the topic is advertised.
 
         Args:
-            message: The serialized message, with any sequence number in its header.
-        """
-        self.publish_current(lambda: message)
-
-    def publish_current(self, serialize: Callable[[], bytes]) -> None:
-        """Sends a message that is serialized while no other thread publishes on the topic.
-
-        Args:
-            serialize: Returns the serialized message, with any sequence number in its header; not
-                called without subscribers, unless the topic is latched.
+            message: The serialized message, with any sequence number in its header. Or a function
+                that returns it, called while no other thread publishes on the topic; not called
+                without subscribers, unless the topic is latched.
         """
         publisher = self._publisher
         impl: Any = publisher.impl if publisher is not None else None
@@ -148,7 +141,8 @@ class Publisher:
             connections = impl.connections
             if impl.closed or not (connections or impl.is_latch):
                 return
-            message = serialize()
+            if not isinstance(message, bytes):
+                message = message()
             impl.seq += 1
             if self._has_header:
                 sequence = impl.seq & _MAX_SEQUENCE

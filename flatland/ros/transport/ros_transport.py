@@ -184,7 +184,8 @@ class RosTransport(Transport):
         rostime._rostime_current = now
         changed = rostime.get_rostime_cond()
         with changed:
-            changed.notify_all()
+            if changed._waiters:
+                changed.notify_all()
 
     # -- displays --------------------------------------------------------------------------
 
@@ -236,4 +237,4 @@ class _ClockTopic(StateTopic):
 
     def send(self) -> None:
         """Publishes the current time; safe from any thread."""
-        self.publish_current(self._packed)
+        self.publish_serialized(self._packed)

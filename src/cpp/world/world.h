@@ -49,7 +49,7 @@ struct Run {
   double dt = 0.0;        // simulated time of a step [s]
   int velocity_iterations = 0;
   int position_iterations = 0;
-  bool continues = false;      // whether a step that was handed back is completed, and no other one
+  bool continues = false;      // whether the first step is the one that was handed back
   bool calls_physics = false;  // whether the physics step is performed by the caller
 
   void check() const;  // throws std::invalid_argument if a number is out of range

@@ -200,11 +200,11 @@ def test_nothing_is_serialized_without_subscribers(registrar: Registrar) -> None
         calls.append(1)
         return b""
 
-    publisher.publish_current(serialize)  # not advertised yet
+    publisher.publish_serialized(serialize)  # not advertised yet
     assert registrar.flush(TIMEOUT)
-    publisher.publish_current(serialize)
+    publisher.publish_serialized(serialize)
     publisher.close()
-    publisher.publish_current(serialize)
+    publisher.publish_serialized(serialize)
     assert registrar.flush(TIMEOUT)
     assert calls == []
 

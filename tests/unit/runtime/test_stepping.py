@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 import random
 import threading
@@ -298,6 +299,19 @@ class TestInterruptions:
         # On a busy machine, the thread may post its request after the run.
         wait_until("a request is processed within a run", is_processed_within_a_run)
 
+    def test_a_request_of_a_function_runs_before_the_next_step(self, files: Any) -> None:
+        world = room(files, {"a": EYE})
+        stamps, times = [], []
+
+        def request(scan: Any) -> None:
+            stamps.append(scan.stamp)
+            world.post(lambda: times.append(world.timekeeper.sim_time_ns))
+
+        world.ports.find_output("/a/scan").subscribe(request)
+        world.step(100)
+        assert len(stamps) > 2
+        assert times == [stamp + 5_000_000 for stamp in stamps]
+
     def test_a_pause_ends_a_run(self, files: Any) -> None:
         world = room(files, {"a": CART.format(drive="DiffDrive")})
         world.post(world.pause)
@@ -495,6 +509,8 @@ class TestOnePath:
         for place in scans:
             kinds = [kind for kind, _ in log.events[:place]]
             assert kinds.count("started") == kinds.count("finished") + 1
+        for first, second in itertools.pairwise(scans):
+            assert any(kind == "finished" for kind, _ in log.events[first:second])
         times = [time for kind, time in log.events if kind == "time"]
         assert times == sorted(times)
         assert times[-1] == 150 * 5_000_000
