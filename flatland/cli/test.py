@@ -70,7 +70,7 @@ def add(commands: Commands) -> None:
         description="Runs scenarios with controllers, on all cores, prints a table, and writes a "
         "report and the results of all runs. The exit code is 1 if a run does not meet its "
         "conditions; with --baseline, if a run that passed before does not pass, a measure became "
-        "significantly worse, or a run has an error.",
+        "significantly worse, or a run has an error; and if a file of the results is incomplete.",
         examples=_EXAMPLES,
     )
     parser.add_argument(

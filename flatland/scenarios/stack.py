@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, Final
 from flatland.scenarios.connection import StackError
 from flatland.scenarios.programs import Program
 from flatland.scenarios.stack_link import StackLink
-from flatland.scenarios.transforms import KEPT
 from flatland.timekeeper import NANOSECONDS
 from flatland.values import Twist
 
@@ -41,7 +40,7 @@ _MAX_COMMANDS: Final = 10  # per step
 _MANY_COMMANDS: Final = 5  # per step; more may be many more
 _LEAST_RATE: Final = 0.95  # simulated time per wall time that counts as real time
 _TF_DELAY: Final = 0.5  # simulated time until the transforms of a time have usually arrived [s]
-_TF_LIMIT: Final = KEPT - 1.0  # simulated time after which they are not awaited any longer [s]
+_TF_MARGIN: Final = 1.0  # simulated time before transforms are forgotten, and no longer awaited [s]
 
 
 class GaveUpError(Exception):
@@ -272,7 +271,7 @@ class Stack:
         while (age := now - self._waiting[0][0]) > _TF_DELAY * NANOSECONDS:
             stamp, (x, y, _theta) = self._waiting[0]
             found = self._link.position(stamp)
-            if found is None and age < _TF_LIMIT * NANOSECONDS:
+            if found is None and age < (self._link.kept - _TF_MARGIN) * NANOSECONDS:
                 return
             self._waiting.popleft()
             if found is not None:

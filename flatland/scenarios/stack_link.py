@@ -83,6 +83,7 @@ class StackLink(WorldObserver):
         """
         with self._commands:
             self._drive_topic = stage.drive.topic
+        self._transforms.keep_periods(stage.task.period)
         self.use(stage)
         layer = stage.world.map_layer or next(
             (name for each in stage.world.layers for name in each.names), ""
@@ -193,6 +194,11 @@ class StackLink(WorldObserver):
                 localized = Transforms((Transform(sent.stamp, WORLD_FRAME, sent.parent, *origin),))
                 self._transforms.add(localized)
                 self._tf.publish(self._convert(localized))
+
+    @property
+    def kept(self) -> float:
+        """Simulated time for which positions are known [s]."""
+        return self._transforms.kept
 
     def position(self, stamp: int) -> tuple[float, float] | None:
         """Returns the position of the robot in the map by transforms [m]; None if it is not known.

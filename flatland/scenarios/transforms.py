@@ -18,8 +18,8 @@ from flatland.timekeeper import NANOSECONDS
 from flatland.values import Transform
 
 KEPT: Final = 3.0
-"""Simulated time for which transforms are kept [s]."""
-_KEPT_NS: Final = round(KEPT * NANOSECONDS)
+"""Simulated time for which transforms are kept, unless periods are long [s]."""
+_PERIODS: Final = 2  # of commands for which transforms are kept, if they are longer than that time
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,13 +33,26 @@ class _Sample:
 
 
 class TransformHistory:
-    """Transforms with their times; methods are safe from any thread."""
+    """Transforms with their times; methods are safe from any thread.
+
+    Attributes:
+        kept: Simulated time for which transforms are kept [s].
+    """
 
     def __init__(self) -> None:
         """Creates a history without transforms."""
+        self.kept = KEPT
         self._lock = threading.Lock()
         self._samples: dict[str, list[_Sample]] = {}  # of each frame, in the order of their times
         self._static: dict[str, _Sample] = {}
+
+    def keep_periods(self, period: float) -> None:
+        """Keeps transforms for some periods of commands, if this is longer.
+
+        Args:
+            period: The period [s].
+        """
+        self.kept = max(KEPT, _PERIODS * period)
 
     def add(self, transforms: Sequence[Transform]) -> None:
         """Adds transforms of the own world."""
@@ -100,7 +113,8 @@ class TransformHistory:
         if index < len(samples) and samples[index].stamp == sample.stamp:
             return  # The own transforms are received as well.
         samples.insert(index, sample)
-        del samples[: bisect.bisect_left(samples, samples[-1].stamp - _KEPT_NS, key=_stamp)]
+        oldest = samples[-1].stamp - round(self.kept * NANOSECONDS)
+        del samples[: bisect.bisect_left(samples, oldest, key=_stamp)]
 
     def _at(self, frame: str, time_ns: int) -> _Sample | None:
         """Returns the transform of a frame at a time, None if there is none."""

@@ -67,3 +67,12 @@ def test_old_transforms_are_forgotten(history: TransformHistory) -> None:
     history.add([Transform(round((KEPT + 1.5) * SECOND), "odom", "base", 0.0, 0.0, 0.0)])
     assert history.position("base", SECOND) is None
     assert history.position("base", 2 * SECOND) == pytest.approx((2.0, 0.0))
+
+
+def test_transforms_are_kept_for_long_periods(history: TransformHistory) -> None:
+    history.add_message(message("map", "odom", 0.0, 0.0), is_static=True)
+    history.keep_periods(10.0)
+    history.add([Transform(12 * SECOND, "odom", "base", 12.0, 0.0, 0.0)])
+    assert history.position("base", 2 * SECOND) == pytest.approx((2.0, 0.0))
+    history.keep_periods(0.1)
+    assert history.kept == KEPT
