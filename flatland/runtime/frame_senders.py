@@ -54,19 +54,15 @@ class FrameSenders:
                 _warn(child, other, new)
         senders.append(new)
 
-    def has(self, frames: FramePair) -> bool:
-        """Returns whether a plugin sends a pair of frames."""
-        parent, child = frames
-        return any(sender[0] == parent for sender in self._senders.get(child, ()))
-
-    def remove(self, plugin: FlatlandPlugin, frames: FramePair) -> None:
-        """Removes a pair of frames that was added."""
+    def remove(self, plugin: FlatlandPlugin, frames: FramePair) -> bool:
+        """Removes a pair of frames that was added; returns whether no other plugin sends it."""
         parent, child = frames
         senders = [each for each in self._senders[child] if each[:2] != (parent, plugin)]
-        if senders:
-            self._senders[child] = senders
-        else:
+        if not senders:
             del self._senders[child]
+            return True
+        self._senders[child] = senders
+        return all(sender[0] != parent for sender in senders)
 
 
 def _are_in_conflict(first: _Sender, second: _Sender) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from threading import get_ident
 from typing import TYPE_CHECKING, Any
 
@@ -44,19 +44,6 @@ class Job:
     was_called: bool = False
 
 
-@dataclass(slots=True, eq=False)
-class ControllerJob:
-    """A controller of a plugin in the queue of the core.
-
-    Attributes:
-        plugin: The plugin.
-        failed_at: Simulated time of the last failure before and after the physics step [ns].
-    """
-
-    plugin: FlatlandPlugin
-    failed_at: dict[bool, int] = field(default_factory=dict)
-
-
 class Jobs:
     """The updates and controllers of plugins, in the order in which the plugins were loaded.
 
@@ -93,7 +80,9 @@ class Jobs:
         self._order: dict[FlatlandPlugin, int] = {}
         self._count = 0
         self._jobs: dict[int, Job] = {}
-        self._controllers: dict[int, ControllerJob] = {}
+        self._controllers: dict[int, FlatlandPlugin] = {}
+        # Simulated time of the last failure of controllers, before or after the physics step [ns].
+        self._failures: dict[tuple[int, bool], int] = {}
         # By the function `prepare` of updates: the number of the group and of its updates.
         self._groups: dict[Callable[..., object], tuple[int, int]] = {}
         self._last_group = 0
@@ -119,7 +108,7 @@ class Jobs:
             else:
                 job.set_place(order, number)
                 if isinstance(job, Controller):
-                    self._controllers[job.id] = ControllerJob(plugin)
+                    self._controllers[job.id] = plugin
         self._is_stale = True
 
     def _add_update(self, plugin: FlatlandPlugin, update: Update, place: tuple[int, int]) -> None:
@@ -150,10 +139,13 @@ class Jobs:
             for job in [job for job in self._jobs.values() if job.plugin is plugin]:
                 del self._jobs[job.id]
                 self._queue.remove_callback(job.id)
-                self._leave_group(job.update)
+                if job.update.prepare is not None:
+                    self._leave_group(job.update.prepare)
         for declared in plugin._jobs:
             if isinstance(declared, Controller | Crowd):
                 self._controllers.pop(declared.id, None)
+                for is_after in (False, True):
+                    self._failures.pop((declared.id, is_after), None)
                 if declared.alive:
                     declared.remove()
         for later in (self._later, self._repeated):
@@ -163,12 +155,10 @@ class Jobs:
                 if entry[0] is not plugin:
                     later.append(entry)
 
-    def _leave_group(self, update: Update) -> None:
-        if update.prepare is None:
-            return
-        group, users = self._groups.pop(update.prepare)
+    def _leave_group(self, prepare: Callable[..., object]) -> None:
+        group, users = self._groups.pop(prepare)
         if users > 1:
-            self._groups[update.prepare] = group, users - 1
+            self._groups[prepare] = group, users - 1
 
     def __contains__(self, plugin: FlatlandPlugin) -> bool:
         """Returns whether a plugin was added and not removed."""
@@ -332,16 +322,16 @@ class Jobs:
         """
         now = self._timekeeper.sim_time_ns
         for controller, text in failures:
-            job = self._controllers.get(controller)
-            if job is None:
+            plugin = self._controllers.get(controller)
+            if plugin is None:
                 continue
             source = (controller, is_after)
             # The core reports no successes: it has succeeded if it did not fail in the last step.
-            if job.failed_at.get(is_after) != now - self._timekeeper.step_size_ns:
-                self._faults.succeeded(job.plugin, source)
-            job.failed_at[is_after] = now
+            if self._failures.get(source) != now - self._timekeeper.step_size_ns:
+                self._faults.succeeded(plugin, source)
+            self._failures[source] = now
             hook = STEP_HOOKS["after" if is_after else "before"]
-            self._call(job.plugin, hook, source, _fail, text)
+            self._call(plugin, hook, source, _fail, text)
 
 
 def _fail(text: str) -> None:

@@ -74,7 +74,7 @@ class PluginHost:
         self._faults = faults
         self._timeout = timeout
         self.disabled: set[FlatlandPlugin] = set()
-        self._unswept: list[FlatlandPlugin] = []  # those of `disabled` that have jobs
+        self._is_swept = True  # whether no plugin of `disabled` has jobs
         self._starting: FlatlandPlugin | None = None  # whose `on_initialize` runs
         self.jobs = Jobs(
             world.physics.jobs,
@@ -241,7 +241,6 @@ class PluginHost:
         """Removes the records of plugins that have ended."""
         self._faults.forget(set(plugins))
         self.disabled.difference_update(plugins)
-        self._unswept = [plugin for plugin in self._unswept if plugin in self.disabled]
 
     def _release(self, plugin: FlatlandPlugin) -> None:
         """Closes the ports and connections that a plugin left open."""
@@ -256,7 +255,7 @@ class PluginHost:
 
     def prepare_step(self, transforms_wanted: bool) -> bool:
         """Prepares the next step; see `Jobs.refresh`."""
-        if self._unswept:
+        if not self._is_swept:
             self._sweep()
         if self.contacts.is_stale:
             self.contacts.update()
@@ -269,8 +268,10 @@ class PluginHost:
 
     def _sweep(self) -> None:
         """Removes the jobs and contact hooks of the plugins that were disabled."""
-        while self._unswept:
-            self._stop(self._unswept.pop())
+        while not self._is_swept:
+            self._is_swept = True  # What `skipped` raises may disable further plugins.
+            for plugin in [plugin for plugin in self.disabled if plugin in self.jobs]:
+                self._stop(plugin)
 
     def find_owner(self, callback: object) -> PortUser | None:
         """Returns who subscribes to an output, or adds an observer, in the current thread.
@@ -323,7 +324,7 @@ class PluginHost:
         except PLUGIN_FAULTS as error:
             if self._faults.add_of_plugin(plugin, hook, source, describe(plugin), error):
                 self.disabled.add(plugin)
-                self._unswept.append(plugin)
+                self._is_swept = False
                 self.jobs.change()
 
     def model_moved(self, model: Model, previous: Mapping[str, Pose], keep_odometry: bool) -> None:

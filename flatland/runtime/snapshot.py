@@ -126,7 +126,8 @@ class _Ports:
         outputs, commands = ports.kept
         self.outputs = [*ports.outputs.values(), *outputs]
         self.commands = [c for same in ports.commands.values() for c in same] + commands
-        self.subscriptions = [entry for output in self.outputs for entry in output.of_plugins]
+        subscribed = [output for output in self.outputs if output._subscribers]
+        self.subscriptions = [entry for output in subscribed for entry in output.of_plugins]
         self.observers = observers.of_plugins
 
     def resume(self, plugins: Collection[PortUser], observers: Observers) -> None:
@@ -419,10 +420,11 @@ def _copy_subscriptions(output: Output[Any], copier: Copier) -> None:
         WorldError: A subscription cannot be copied.
     """
     copy = copier.find(output)
-    what = f'what wants the output "{output.topic}"'
-    inner = frozenset(_copied(tuple(output._inner_wanters), copier, what))
-    copy._inner_wanters = inner
-    copy._wanters = inner | ({copier.find(who) for who in output._wanters} - {None})
+    copy._wanters = frozenset({copier.find(who) for who in output._wanters} - {None})
+    if output._inner_wanters:
+        what = f'what wants the output "{output.topic}"'
+        copy._inner_wanters = frozenset(_copied(tuple(output._inner_wanters), copier, what))
+        copy._wanters |= copy._inner_wanters
     for token, callback in output._subscribers:
         if token.owner is None and copier.find(getattr(callback, "__self__", None)) is None:
             continue

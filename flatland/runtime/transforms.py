@@ -67,8 +67,7 @@ class TransformBuffer:
     def forget(self, plugin: FlatlandPlugin, frames: Iterable[FramePair]) -> None:
         """Drops the transforms of a plugin that ended."""
         for pair in frames:
-            self._senders.remove(plugin, pair)
-            if not self._senders.has(pair):
+            if self._senders.remove(plugin, pair):
                 self._latest.pop(pair, None)
                 self._pending.pop(pair, None)
 
