@@ -7,6 +7,28 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from flatland.errors import FlatlandError
+
+
+def check_outputs(*paths: str | os.PathLike[str] | None) -> None:
+    """Checks before long work that files can be created in their folders.
+
+    Args:
+        *paths: The files; None for those that are not wanted.
+
+    Raises:
+        FlatlandError: A folder does not exist, or the path is that of a folder.
+    """
+    for path in paths:
+        if path is None:
+            continue
+        folder = Path(os.path.realpath(path)).parent
+        if not folder.is_dir():
+            shown = Path(path).parent
+            raise FlatlandError(f"cannot write {os.fspath(path)}: there is no folder {shown}")
+        if Path(path).is_dir():
+            raise FlatlandError(f"cannot write {os.fspath(path)}: it is a folder")
+
 
 @contextmanager
 def named_errors(path: str | os.PathLike[str], part: Path | None = None) -> Iterator[None]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from flatland.cli.contents import counted
 from flatland.extras import missing
-from flatland.output_files import replaced
+from flatland.output_files import check_outputs, replaced
 
 if TYPE_CHECKING:
     from flatland.node.message_recorder import MessageRecorder
@@ -61,10 +61,11 @@ class Recordings:
             files: Closes the files; removes them if an exception is raised.
 
         Raises:
-            FlatlandError: A required package is not installed.
+            FlatlandError: A folder does not exist, or a required package is not installed.
             OSError: A file cannot be created.
         """
         self.recorders: dict[Path, MessageRecorder] = {}
+        check_outputs(options.bag, options.mcap)
         for path, create in ((options.bag, _create_bag), (options.mcap, _create_mcap)):
             if path is not None:
                 recorder = create(files.enter_context(replaced(path)))

@@ -28,7 +28,7 @@ from flatland.cli.outputs import Recordings, path_with, recording_arguments
 from flatland.cli.progress import StopSignals, progress_bar
 from flatland.drawing import VIDEO_FORMATS, FrameRenderer, VideoFile, check_matplotlib, check_opencv
 from flatland.errors import FlatlandError
-from flatland.output_files import replaced
+from flatland.output_files import check_outputs, replaced
 from flatland.runtime.plain_commands import set_command
 from flatland.world import World
 
@@ -98,6 +98,7 @@ def add(commands: Commands) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    check_outputs(options.video, options.record)
     if options.video:  # before loading, which may take long
         check_matplotlib()
         check_opencv()

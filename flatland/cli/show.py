@@ -15,6 +15,7 @@ from flatland.cli.arguments import (
     picture_options,
 )
 from flatland.drawing import PICTURE_FORMATS, check_matplotlib, save
+from flatland.output_files import check_outputs
 
 _EXAMPLES = (
     "flatland show worlds/office/world.yaml -o office.png",
@@ -59,6 +60,7 @@ def _picture_path(text: str) -> Path:
 
 
 def _show(options: argparse.Namespace) -> int:
+    check_outputs(options.output)
     check_matplotlib()  # before loading and stepping, which may take long
     with load_world_or_model(options, options.seed) as world:
         world.step(options.steps)

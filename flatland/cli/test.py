@@ -11,6 +11,7 @@ from flatland.cli.arguments import Commands, add_command, add_param, count, posi
 from flatland.cli.check import check_scenarios
 from flatland.cli.contents import counted
 from flatland.cli.progress import StopSignals, counting_bar
+from flatland.output_files import check_outputs
 from flatland.scenarios.cluster import Cluster
 from flatland.scenarios.columns import FAULTS
 from flatland.scenarios.comparison import Change, Comparison, compare
@@ -236,6 +237,7 @@ def _test(options: argparse.Namespace) -> int:
     controllers = _controllers(options.robot or ["gap"], options.working_dir or "")
     if not controllers:
         options.parser.error("--robot: must name a controller")
+    check_outputs(options.junit)
     scenarios = _load(options)
     if scenarios is None:
         return 1

@@ -15,10 +15,9 @@ from programs import run_program
 
 # From the bottom up. A module imports only from floors below its own and from its own room.
 FLOORS = (
-    ("checks", "uncopied"),
+    ("checks", "errors", "uncopied"),
     (
         "defaults",
-        "errors",
         "geometry",
         "graph_names",
         "output_files",
