@@ -263,7 +263,7 @@ class PluginHost:
 
     def is_prepared(self, transforms_wanted: bool) -> bool:
         """Returns whether `prepare_step` has nothing to do."""
-        is_stale = self._unswept or self.contacts.is_stale
+        is_stale = self.contacts.is_stale or not self._is_swept
         return not is_stale and self.jobs.is_current(transforms_wanted)
 
     def _sweep(self) -> None:
