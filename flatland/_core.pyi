@@ -1252,6 +1252,18 @@ class DriveController(Controller):
             StaleHandleError: The controller was removed, or a body destroyed.
             WorldLockedError: The world is stepping.
         """
+    def set_command_timeout(self, limit: int) -> None:
+        """Makes the drive stop if it has not received a command for some time, as a command of zeros does.
+
+        Args:
+            limit: The simulated time without a command [ns], 0 for no limit.
+
+        Raises:
+            ValueError: The limit is negative.
+        """
+    @property
+    def command_age(self) -> int:
+        """Simulated time since the last command, up to the limit of this time [ns]."""
     def release_brakes(self) -> None:
         """Makes the brakes hold the pose at the next step, for a body that was moved."""
     @property
@@ -1351,12 +1363,21 @@ class AckermannController(DriveController):
             world: World that contains the object.
             handle_id: Id of the object in the world.
         """
-    def set_target(self, speed: float, angular: float) -> None:
+    def set_target(
+        self,
+        speed: float,
+        angular: float,
+        acceleration: float = 0.0,
+        steering_velocity: float = 0.0,
+    ) -> None:
         """Sets the command, from the next step on.
 
         Args:
             speed: Speed of the centre of the rear axle [m/s].
             angular: Steering angle [rad]; the yaw rate if the drive takes a twist [rad/s].
+            acceleration: Limit of acceleration and deceleration besides that of the car [m/s²], 0 for none;
+                the sign is ignored.
+            steering_velocity: The same of the rate of the steering angle [rad/s].
         """
     def set_limits(
         self,

@@ -6,6 +6,7 @@ import gc
 import importlib
 import math
 import re
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -20,6 +21,7 @@ from flatland.drawing.render import MATPLOTLIB_LOCK, make_figure
 from flatland.gym.episodes import Episodes
 from flatland.gym.live_view import EpisodeView, check_live_view, checked_port
 from flatland.gym.stock import Stock
+from flatland.plugin_api.body_drive import BodyDrive
 from flatland.runtime.randomization import randomize_plugins
 
 if TYPE_CHECKING:
@@ -112,6 +114,7 @@ class Stage:
                     undo.callback(self._used[-1].world.close)
             self.worlds = [each.world for each in self._used]
             agents = [agent for each in self._used for agent in each.agents]
+            _warn_about_timeouts(agents, settings.dt)
             buildings = [each.building for each in self._used for _ in each.agents]
             self.episodes = Episodes(
                 agents, settings, num_threads, buildings, [each.agents[0] for each in firsts]
@@ -241,6 +244,26 @@ def _paused_collector() -> Iterator[None]:
     finally:
         if was_enabled:
             gc.enable()
+
+
+def _warn_about_timeouts(agents: Iterable[Agent], dt: float) -> None:
+    """Warns about robots that stop between two actions.
+
+    Args:
+        agents: The agents of all environments.
+        dt: Simulated time between two actions [s].
+    """
+    limits = {
+        agent.model.name: agent.drive.command_timeout
+        for agent in agents
+        if isinstance(agent.drive, BodyDrive) and 0 < agent.drive.command_timeout < dt
+    }
+    for name, limit in limits.items():
+        warnings.warn(
+            f'model "{name}" stops between two actions: its command_timeout of {limit:g} s is '
+            f"shorter than the {dt:g} s between them",
+            stacklevel=3,
+        )
 
 
 def _check_memory(count: int, buildings: int, size: int) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from flatland.plugin_api.drive import Odometer, open_twist_command
 from flatland.plugin_api.dynamics_limits import DynamicsLimits
+from flatland.plugin_api.parameters import read_not_negative
 from flatland.plugin_api.plugin import ModelPlugin
+from flatland.timekeeper import NANOSECONDS
 from flatland.values import Twist, TwistWithCovariance
 
 if TYPE_CHECKING:
@@ -20,6 +23,9 @@ if TYPE_CHECKING:
     from flatland.plugin_api.ports import Command, Output
     from flatland.plugin_api.traction import Traction
     from flatland.timekeeper import Timekeeper
+
+
+_MAX_TIMEOUT: Final = 1 << 62  # ns
 
 
 class BodyDrive(ModelPlugin):
@@ -40,6 +46,7 @@ class BodyDrive(ModelPlugin):
     _traction: Traction | None = None
     _controller: DriveController
     _limits: tuple[DynamicsLimits, DynamicsLimits]  # linear, angular
+    _command_timeout = 0.0
     _odometer: Odometer
     _twist: Output[TwistWithCovariance] | None
     is_holonomic = False
@@ -51,7 +58,7 @@ class BodyDrive(ModelPlugin):
         return self._controller
 
     def read_limits(self, config: YamlReader) -> None:
-        """Reads `linear_dynamics` and `angular_dynamics`; for `on_initialize`.
+        """Reads `linear_dynamics`, `angular_dynamics` and `command_timeout`; for `on_initialize`.
 
         Raises:
             YamlError: A limit is invalid.
@@ -61,6 +68,7 @@ class BodyDrive(ModelPlugin):
             for key in ("linear_dynamics", "angular_dynamics")
         )
         self._limits = linear, angular
+        self._command_timeout = read_not_negative(config, "command_timeout", 0.0)
 
     @property
     def linear_dynamics(self) -> DynamicsLimits:
@@ -83,6 +91,21 @@ class BodyDrive(ModelPlugin):
         self.apply_limits()
 
     @property
+    def command_timeout(self) -> float:
+        """Simulated time without a command after which the drive stops [s]; settable.
+
+        The drive stops as after a command of zeros, within its limits; 0 or infinity for never.
+        """
+        return self._command_timeout
+
+    @command_timeout.setter
+    def command_timeout(self, timeout: float) -> None:
+        if not timeout >= 0.0:
+            raise ValueError(f"command_timeout must not be negative or NaN, got {timeout}")
+        self._command_timeout = float(timeout)
+        self._apply_timeout()
+
+    @property
     def traction(self) -> Traction | None:
         """Limits of the forces in mode `force`, settable; None in mode `velocity`."""
         return self._traction
@@ -96,8 +119,13 @@ class BodyDrive(ModelPlugin):
         self._traction = traction
 
     def apply_limits(self) -> None:
-        """Passes the limits to the controller."""
+        """Passes the limits and the timeout to the controller."""
         self._set_limits(*self._limits)
+        if self._command_timeout:
+            self._apply_timeout()
+
+    def _apply_timeout(self) -> None:
+        self._controller.set_command_timeout(_to_nanoseconds(self._command_timeout))
 
     @abstractmethod
     def _set_limits(self, linear: DynamicsLimits, angular: DynamicsLimits) -> None:
@@ -159,6 +187,8 @@ class BodyDrive(ModelPlugin):
     def state(self) -> object:
         """Returns the state of the controller and of the odometry."""
         state = (*self.drive_state(), self._odometer.state())
+        if self._command_timeout:
+            state = (*state, self._controller.command_age)
         return state if self.traction is None else (*state, self._controller.traction_state)
 
     def drive_state(self) -> tuple[object, ...]:
@@ -189,3 +219,10 @@ class BodyDrive(ModelPlugin):
                     odometer.twist_covariance(pose, velocity),
                 )
             )
+
+
+def _to_nanoseconds(timeout: float) -> int:
+    """Returns a timeout in nanoseconds; 0, which means none, only for 0 and infinity."""
+    if timeout == 0.0 or math.isinf(timeout):
+        return 0
+    return min(max(round(timeout * NANOSECONDS), 1), _MAX_TIMEOUT)

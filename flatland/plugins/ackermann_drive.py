@@ -162,17 +162,18 @@ class AckermannDrive(BodyDrive):
         return self._controller.state[2]
 
     def set_target(self) -> None:
-        """Passes the command, and the limits that it contains, to the controller."""
+        """Passes the command to the controller, with the limits that it contains."""
         if self._twist_command is not None:
             twist = self._twist_command.value
             self._controller.set_target(twist.linear_x, twist.angular_z)
         elif self._ackermann_command is not None:
             command = self._ackermann_command.value
-            self._set_limits(
-                _with_acceleration(self.linear_dynamics, command.acceleration),
-                _with_velocity(self.angular_dynamics, command.steering_angle_velocity),
+            self._controller.set_target(
+                command.speed,
+                command.steering_angle,
+                command.acceleration,
+                command.steering_angle_velocity,
             )
-            self._controller.set_target(command.speed, command.steering_angle)
 
     def drive_state(self) -> tuple[object, ...]:
         """Returns the state of the steering and the speed."""
@@ -181,24 +182,3 @@ class AckermannDrive(BodyDrive):
 
 def _has_messages() -> bool:
     return importlib.util.find_spec("ackermann_msgs") is not None
-
-
-def _lesser(limit: float, other: float) -> float:
-    """Returns the lesser one of two limits, of which 0 means none."""
-    return min(limit, abs(other)) if limit and other else limit or abs(other)
-
-
-def _with_acceleration(limits: DynamicsLimits, acceleration: float) -> DynamicsLimits:
-    return DynamicsLimits(
-        limits.velocity_limit,
-        _lesser(limits.acceleration_limit, acceleration),
-        _lesser(limits.deceleration_limit, acceleration),
-    )
-
-
-def _with_velocity(limits: DynamicsLimits, velocity: float) -> DynamicsLimits:
-    return DynamicsLimits(
-        _lesser(limits.velocity_limit, velocity),
-        limits.acceleration_limit,
-        limits.deceleration_limit,
-    )

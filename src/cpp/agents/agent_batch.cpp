@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <type_traits>
-#include <variant>
 
 #include "rays/scene_view.h"
 #include "world/bodies.h"
@@ -11,22 +9,6 @@
 #include "world/errors.h"
 
 namespace flatland {
-namespace {
-
-void set_target(Motion& motion, const double* velocity) {
-  std::visit(
-      [&](auto& kind) {
-        using Kind = std::decay_t<decltype(kind)>;
-        if constexpr (std::is_same_v<Kind, TwistMotion> || std::is_same_v<Kind, OmniMotion> ||
-                      std::is_base_of_v<SteeredMotion, Kind>) {
-          kind.target = {velocity[0], velocity[1], velocity[2]};
-        }
-      },
-      motion);
-}
-
-}  // namespace
-
 AgentBatch::AgentBatch(std::vector<Agent> agents)
     : agents_(std::move(agents)), permitted_(agents_.size(), kNever) {}
 
@@ -136,7 +118,7 @@ bool AgentBatch::step(const Team& team, std::optional<UnfinishedRun>& unfinished
 void AgentBatch::set_command(const Agent& agent, const double* velocity) {
   Controller* controller = agent.world->jobs().find_controller(agent.controller);
   if (controller == nullptr) throw StaleHandleError("the controller was removed");
-  set_target(controller->motion, velocity);
+  flatland::set_command(*controller, {velocity[0], velocity[1], velocity[2]});
   TouchCollector* touches = agent.world->contacts().touches.find(agent.touches);
   if (touches == nullptr) throw StaleHandleError("the collector was removed");
   touches->was_touched = false;

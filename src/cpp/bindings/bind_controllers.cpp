@@ -1,5 +1,6 @@
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -107,6 +108,25 @@ Raises:
     WorldLockedError: The world is stepping.
 )");
   drive.def(
+      "set_command_timeout",
+      [](const DriveHandle& self, std::int64_t limit) {
+        if (limit < 0) throw py::value_error("a limit must not be negative");
+        CommandTimeout& timeout = changed_controller(self).timeout;
+        timeout = {limit, std::min(timeout.age, limit)};
+      },
+      py::arg("limit"), R"(
+Makes the drive stop if it has not received a command for some time, as a command of zeros does.
+
+Args:
+    limit: The simulated time without a command [ns], 0 for no limit.
+
+Raises:
+    ValueError: The limit is negative.
+)");
+  drive.def_property_readonly(
+      "command_age", [](const DriveHandle& self) { return changed_controller(self).timeout.age; },
+      "Simulated time since the last command, up to the limit of this time [ns].");
+  drive.def(
       "release_brakes", [](const DriveHandle& self) { changed_traction(self).is_braked = false; },
       "Makes the brakes hold the pose at the next step, for a body that was moved.");
   drive.def_property_readonly(
@@ -129,7 +149,7 @@ void bind_velocities(Class& controller) {
       "set_target",
       [](const ControllerHandle& self, double forward, double sideways, double omega) {
         // A velocity that is out of range is refused when it is applied to the body.
-        motion_of<Kind>(self).target = {forward, sideways, omega};
+        set_command(changed_controller(self), {forward, sideways, omega});
       },
       py::arg("forward"), py::arg("sideways"), py::arg("omega"),
       "Sets the commanded velocity, from the next step on.");

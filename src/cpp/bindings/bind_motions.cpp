@@ -1,5 +1,6 @@
 #include <pybind11/stl.h>
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -46,11 +47,6 @@ auto steering_state(const ControllerHandle& self) {
 }
 
 template <typename Kind>
-void set_steering_target(const ControllerHandle& self, double linear, double angular) {
-  motion_of<Kind>(self).target = {linear, 0.0, angular};
-}
-
-template <typename Kind>
 void set_steering_limits(const ControllerHandle& self, const PyLimits& linear,
                          const PyLimits& angular, double max_angle) {
   auto& motion = motion_of<Kind>(self);
@@ -91,8 +87,12 @@ Raises:
     StaleHandleError: The body or the joint was destroyed.
     WorldLockedError: The world is stepping.
 )");
-  controller.def("set_target", &set_steering_target<TricycleMotion>, py::arg("linear"),
-                 py::arg("angular"), R"(
+  controller.def(
+      "set_target",
+      [](const TricycleHandle& self, double linear, double angular) {
+        set_command(changed_controller(self), {linear, 0.0, angular});
+      },
+      py::arg("linear"), py::arg("angular"), R"(
 Sets the command, from the next step on.
 
 Args:
@@ -158,13 +158,25 @@ Raises:
     StaleHandleError: The body or a joint was destroyed.
     WorldLockedError: The world is stepping.
 )");
-  controller.def("set_target", &set_steering_target<AckermannMotion>, py::arg("speed"),
-                 py::arg("angular"), R"(
+  controller.def(
+      "set_target",
+      [](const AckermannHandle& self, double speed, double angular, double acceleration,
+         double steering_velocity) {
+        set_command(changed_controller(self), {speed, 0.0, angular});
+        auto& motion = motion_of<AckermannMotion>(self);
+        motion.acceleration = std::fabs(acceleration);
+        motion.steering_velocity = std::fabs(steering_velocity);
+      },
+      py::arg("speed"), py::arg("angular"), py::arg("acceleration") = 0.0,
+      py::arg("steering_velocity") = 0.0, R"(
 Sets the command, from the next step on.
 
 Args:
     speed: Speed of the centre of the rear axle [m/s].
     angular: Steering angle [rad]; the yaw rate if the drive takes a twist [rad/s].
+    acceleration: Limit of acceleration and deceleration besides that of the car [m/s²], 0 for none;
+        the sign is ignored.
+    steering_velocity: The same of the rate of the steering angle [rad/s].
 )");
   controller.def(
       "set_limits",

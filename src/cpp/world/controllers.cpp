@@ -4,7 +4,9 @@
 
 #include <math.h>
 
+#include <algorithm>
 #include <cstddef>
+#include <type_traits>
 
 #include "world/bodies.h"
 #include "world/joined_bodies.h"
@@ -35,6 +37,21 @@ void drive_in_body_frame(World& world, b2Body* body, Traction& traction, const T
   const double c = cos(yaw);
   const double s = sin(yaw);
   drive(world, body, traction, {c * forward - s * sideways, s * forward + c * sideways, omega}, dt);
+}
+
+void set_target(Motion& motion, const Triple& target) {
+  std::visit(
+      [&](auto& kind) {
+        using Kind = std::decay_t<decltype(kind)>;
+        if constexpr (std::is_same_v<Kind, TwistMotion> || std::is_same_v<Kind, OmniMotion> ||
+                      std::is_base_of_v<SteeredMotion, Kind>) {
+          kind.target = target;
+        }
+        if constexpr (std::is_same_v<Kind, AckermannMotion>) {
+          kind.acceleration = kind.steering_velocity = 0.0;
+        }
+      },
+      motion);
 }
 
 void advance_motion(World& world, b2Body* body, TwistMotion& motion, double dt) {
@@ -76,15 +93,15 @@ double exact_hypot(double x, double y) {
 }
 
 // Turns a wheel towards an angle within the limits. Returns whether joints have to be set.
-bool turn_wheel(SteeredMotion& motion, double target, double dt) {
+bool turn_wheel(SteeredMotion& motion, const SpeedLimits& limits, double target, double dt) {
   const double remaining = target - motion.angle;
-  const double acceleration = motion.angular.acceleration;
+  const double acceleration = limits.acceleration;
   double velocity = remaining / dt;
   if (acceleration != 0.0 &&
       fabs(remaining) < pow(motion.angle_velocity, 2.0) / (2.0 * acceleration)) {
     velocity = 0.0;  // Deceleration must start now to stop at the target.
   }
-  motion.angle_velocity = motion.angular.step(motion.angle_velocity, velocity, dt);
+  motion.angle_velocity = limits.step(motion.angle_velocity, velocity, dt);
   double angle = motion.angle + motion.angle_velocity * dt;
   const double limit = motion.max_angle;
   if (limit != 0.0) angle = lesser(greater(angle, -limit), limit);
@@ -102,7 +119,7 @@ void set_joint_angle(World& world, Id id, double angle) {
 
 // Turns the front wheel towards an angle within the limits.
 void steer(World& world, TricycleMotion& motion, double target, double dt) {
-  if (turn_wheel(motion, target, dt)) {
+  if (turn_wheel(motion, motion.angular, target, dt)) {
     set_joint_angle(world, motion.joint, motion.angle * motion.steering_sign);
   }
 }
@@ -161,15 +178,26 @@ double angle_for_twist(const AckermannMotion& motion) {
   return lesser(greater(angle, -motion.max_angle), motion.max_angle);
 }
 
+// Returns the lesser one of two limits, of which 0 means none.
+double lesser_limit(double limit, double other) {
+  if (limit == 0.0 || other == 0.0) return limit != 0.0 ? limit : other;
+  return lesser(limit, other);
+}
+
 void advance_motion(World& world, b2Body* body, AckermannMotion& motion, double dt) {
   motion.target_angle = motion.takes_twist ? angle_for_twist(motion) : motion.target[2];
-  if (turn_wheel(motion, motion.target_angle, dt)) {
+  SpeedLimits linear = motion.linear;
+  linear.acceleration = lesser_limit(linear.acceleration, motion.acceleration);
+  linear.deceleration = lesser_limit(linear.deceleration, motion.acceleration);
+  SpeedLimits angular = motion.angular;
+  angular.velocity = lesser_limit(angular.velocity, motion.steering_velocity);
+  if (turn_wheel(motion, angular, motion.target_angle, dt)) {
     const auto angles = ackermann_angles(motion.angle, motion.wheelbase, motion.track);
     for (std::size_t i = 0; i < 2; ++i) {
       set_joint_angle(world, motion.joints[i], angles[i] * motion.steering_signs[i]);
     }
   }
-  const double v = motion.speed = motion.linear.step(motion.speed, motion.target[0], dt);
+  const double v = motion.speed = linear.step(motion.speed, motion.target[0], dt);
   const double omega = v * tan(motion.angle) / motion.wheelbase;
   drive_rear_center(world, body, motion, v, omega, dt);
 }
@@ -260,6 +288,20 @@ double SpeedLimits::step(double v, double target, double dt) const {
     change = deceleration * dt;
   }
   return v + lesser(greater(target - v, -change), change);
+}
+
+void set_command(Controller& controller, const Triple& target) {
+  controller.timeout.age = 0;
+  set_target(controller.motion, target);
+}
+
+void age_command(Controller& controller, std::int64_t step) {
+  CommandTimeout& timeout = controller.timeout;
+  if (timeout.age < timeout.limit) {
+    timeout.age += std::min(step, timeout.limit - timeout.age);
+  } else if (timeout.limit != 0) {
+    set_target(controller.motion, {});
+  }
 }
 
 void advance(World& world, b2Body* body, Motion& motion, double dt) {

@@ -67,6 +67,9 @@ struct AckermannMotion : SteeredMotion {
   Id joints[2] = {0, 0};  // joints of the left and the right front wheel, 0 for none
   double steering_signs[2] = {1.0, 1.0};
   double track = 0.0;  // distance of the front wheels [m]
+  // Limits of the last command, in addition to those of the car, 0 for none.
+  double acceleration = 0.0;       // [m/s^2]
+  double steering_velocity = 0.0;  // [rad/s]
 };
 
 // Returns the angles of the left and the right front wheel whose axes meet on the rear axle, for
@@ -92,13 +95,27 @@ struct TweenMotion {
 using Motion = std::variant<TwistMotion, TricycleMotion, TweenMotion, AckermannMotion, OmniMotion,
                             PathMotion, RollingWheels>;
 
+// Simulated time without a new command after which a drive stops.
+struct CommandTimeout {
+  std::int64_t limit = 0;  // [ns], 0 for none
+  std::int64_t age = 0;    // time since the last command [ns], up to the limit
+};
+
 // A motion of a body, carried out in each step: `advance` before the physics step, and `hold` after
 // it.
 struct Controller {
   Id body = 0;
   JobPlace place;
   Motion motion;
+  CommandTimeout timeout;
 };
+
+// Sets the command of a drive: the velocity, or the speed and the steering angle. Has no effect on
+// motions that are no drives.
+void set_command(Controller& controller, const Triple& target);
+// Accounts for a step of the given duration [ns] that is about to begin. Stops a drive whose last
+// command is too old, as a command of zeros does.
+void age_command(Controller& controller, std::int64_t step);
 
 // Advances the motion by dt seconds and sets the velocity of the body. Throws std::invalid_argument
 // if the velocity is out of range. The motion has advanced in this case, too.

@@ -232,6 +232,7 @@ void JobQueue::control(World& world, Phase phase, Id id, double dt) {
     }
     return;
   }
+  age_command(*controller, step_);
   const Motion before = controller->motion;
   try {
     advance(world, body, controller->motion, dt);

@@ -290,6 +290,7 @@ DRIVE_KEYS = (
     Key("odom_pose_covariance", f"[{', '.join('0' * 36)}]", "36 floats"),
     Key("odom_twist_covariance", f"[{', '.join('0' * 36)}]", "36 floats"),
     *keys("map", linear_dynamics="{}", angular_dynamics="{}"),
+    Key("command_timeout", "1", "float", limit=">= 0"),
     AFTER_STEP,
 )
 

@@ -30,10 +30,13 @@ def test_robot(capsys):
         model = world.spawn_model("rover_2.model.yaml", "rover")
         assert model is not None
         scan = world.output("/scan")
-        world.command("/cmd_vel").set(flatland.Twist(linear_x=0.5))
-        world.step(400)
+        for _ in range(10):
+            world.command("/cmd_vel").set(flatland.Twist(linear_x=0.5))
+            world.step(40)
         assert model.pose[0] > 0.7
         assert len(scan.latest.ranges) > 100
+        world.step(200)
+        assert model.bodies[0].velocity[0] == 0.0  # without a command
 
 
 def test_world(folder, capsys):

@@ -76,6 +76,35 @@ def env(make: Make, room: Path) -> Any:
     return env
 
 
+def with_timeout(room: Path, timeout: float) -> Path:
+    """Gives the drive of the robot of a room a time limit of commands [s]."""
+    model = room.parent / "robot.model.yaml"
+    drive = "{type: DiffDrive, name: drive, body: base"
+    model.write_text(model.read_text().replace(drive, f"{drive}, command_timeout: {timeout}"))
+    return room
+
+
+def test_the_core_stops_agents_whose_commands_are_too_old(make: Make, room: Path) -> None:
+    with_timeout(room, 0.05)
+    text = r'"robot" stops between two actions: .* 0\.05 s .* 0\.1 s'
+    with pytest.warns(UserWarning, match=text):
+        env, attended = create(make, room), create(make, room)
+    results = run(env)
+    for world in attended.worlds:
+        world.add_observer(Watcher())  # Python steps it.
+    assert run(attended) == results
+    speeds = env.episodes.situation.velocities[:, 0]
+    assert not speeds.any()
+
+
+def test_a_time_limit_of_the_length_of_a_period_has_no_effect(make: Make, room: Path) -> None:
+    def observations(world: Path) -> list[Any]:
+        return run(create(make, world))[::2]
+
+    before = observations(room)
+    assert observations(with_timeout(room, 0.1)) == before
+
+
 @pytest.mark.parametrize("world", ["room", "corridor"])
 def test_an_observer_does_not_change_results(make: Make, room: Path, world: str) -> None:
     env, watched = (create(make, room if world == "room" else world) for _ in range(2))

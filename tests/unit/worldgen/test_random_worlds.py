@@ -136,8 +136,9 @@ def test_the_files_are_a_world_that_runs(kind: str, tmp_path: Path) -> None:
         assert world.model("robot").pose == pytest.approx(generated.start, abs=1e-3)
         assert world.is_free(generated.start, 0.3, ignore=["robot"])
         scan = world.output("/scan")
-        world.command("/cmd_vel").set(flatland.Twist(angular_z=1.0))
-        world.step(200)
+        for _ in range(2):
+            world.command("/cmd_vel").set(flatland.Twist(angular_z=1.0))
+            world.step(100)
         assert abs(world.model("robot").pose[2]) > 0.5
         assert np.isfinite(scan.latest.ranges).all()  # walls all around
         # Within the range of random numbers, all free places are connected.
