@@ -284,18 +284,22 @@ class Odometer:
             pose: (x, y, yaw) of the origin of the body in the world frame [m, rad].
             velocity: (vx, vy, omega) of the origin of the body in the world frame [m/s, rad/s].
         """
+        truth, odometry = self._truth, self._odometry
+        wants_truth = truth is not None and truth.wanted
+        wants_odometry = odometry is not None and odometry.wanted
+        if not (self.sends_transform or wants_truth or wants_odometry):
+            return
         estimate = pose if self._is_exact else self._estimate(pose)
-        noisy_pose = self._noisy(estimate, self._pose_noise)
+        noisy_pose = self._noisy(estimate, self._pose_noise) if self._active_noise else estimate
         if self.sends_transform:
             self._plugin.send_transform(self.frame_id, self.child_frame_id, *noisy_pose)
-        truth, odometry = self._truth, self._odometry
-        if truth is None or odometry is None or not (truth.wanted or odometry.wanted):
+        if not (wants_truth or wants_odometry):
             return
         true_twist = to_local(velocity, pose[2]) if self._local else velocity
         child = self.child_frame_id
-        if truth.wanted:
+        if truth is not None and wants_truth:
             truth.emit(Odometry(stamp, self.world_frame_id, child, pose, true_twist))
-        if odometry.wanted:
+        if odometry is not None and wants_odometry:
             twist, pose_covariance = true_twist, self._pose_covariance
             yaw = 0.0 if self._local else estimate[2]
             if not self._is_exact:
@@ -303,13 +307,15 @@ class Odometer:
                 twist = (*rotate(twist, yaw), twist[2])
             if self._drift is not None and self._adds_pose_covariance:
                 pose_covariance = self._drift.pose_covariance() + pose_covariance
+            if self._active_noise:
+                twist = self._noisy(twist, self._twist_noise)
             odometry.emit(
                 Odometry(
                     stamp,
                     self.frame_id,
                     child,
                     noisy_pose,
-                    self._noisy(twist, self._twist_noise),
+                    twist,
                     pose_covariance,
                     self.twist_covariance(pose, velocity, yaw),
                 )

@@ -9,7 +9,7 @@ from flatland.plugin_api.parameters import read_bodies, read_body_or_first, read
 from flatland.plugin_api.plugin import ModelPlugin
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from flatland.config.reader import YamlReader
     from flatland.geometry import Pose
@@ -68,13 +68,16 @@ class ModelTfPublisher(ModelPlugin):
         for transform in self._transforms(poses[0], poses[1:]):
             self.send_past_transform(stamp, *transform)
 
-    def _transforms(self, reference: Pose, others: Sequence[Pose]) -> Iterator[FrameTransform]:
+    def _transforms(self, reference: Pose, others: Sequence[Pose]) -> list[FrameTransform]:
         """Returns all transforms: parent, child, and the pose of the child in the parent."""
         x, y, yaw = reference
         c, s = math.cos(yaw), math.sin(yaw)
         parent = self._reference_frame_id
+        transforms: list[FrameTransform] = []
         for (_, frame_id), (body_x, body_y, body_yaw) in zip(self._others, others, strict=True):
             dx, dy = body_x - x, body_y - y
-            yield parent, frame_id, c * dx + s * dy, c * dy - s * dx, body_yaw - yaw
+            pose = (c * dx + s * dy, c * dy - s * dx, body_yaw - yaw)
+            transforms.append((parent, frame_id, *pose))
         if self._sends_world:
-            yield self.world_frame_id, parent, x, y, yaw
+            transforms.append((self.world_frame_id, parent, x, y, yaw))
+        return transforms

@@ -296,7 +296,8 @@ class Stepping:
                         and not self._has_to_end(while_paused)
                         and host.is_prepared(self._observers.want_transforms)
                     )
-                    run = run._replace(time=start, n=n - made if goes_on else 1, continues=True)
+                    rest = n - made if goes_on else 1
+                    run = Run(start, step, rest, *run[3:6], True, run.calls_physics)
                     result = yield run
                     continue
                 made += 1

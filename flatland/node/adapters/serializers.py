@@ -58,8 +58,9 @@ def transform(value: values.Transform, to: Writer) -> None:
 def transforms(value: node_values.Transforms, to: Writer) -> None:
     """Writes a `tf2_msgs/TFMessage` with the transforms of a step."""
     to.count(len(value))
-    for each in value:
-        transform(each, to)
+    write = to.stamped_pose
+    for each in value:  # without a call of `transform`, for /tf
+        write(each.stamp, each.parent, each.child, each.x, each.y, each.yaw, each.roll)
 
 
 def people(value: values.People, to: Writer) -> None:
