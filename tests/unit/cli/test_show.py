@@ -78,6 +78,36 @@ def test_a_line_says_that_transparent_walls_are_drawn(files, tmp_path, capsys):
         assert capsys.readouterr().out == line
 
 
+def test_lines_say_what_a_picture_does_not_show(files, tmp_path, capsys):
+    def lines(bodies: str, *arguments: str, layers: str = "[]") -> list[str]:
+        files.write("m.model.yaml", f"bodies: [{bodies}]")
+        models = "models: [{name: m, model: m.model.yaml}]"
+        path = files.write("w.yaml", f"properties: {{}}\nlayers: {layers}\n{models}\n")
+        options = ["-o", tmp_path / "a.png", "--dpi", "20", "--no-axes", *arguments]
+        assert main("show", path, *options) == 0
+        return capsys.readouterr().out.splitlines()
+
+    circle = "footprints: [{type: circle, radius: 1, density: 1}]"
+    clear = f"color: [1, 0, 0, 0], {circle}"
+    not_drawn = "not drawn, because the alpha of the color is 0: "
+    assert lines(f"{{name: a, {circle}}}") == []
+    assert lines(f"{{name: a, {circle}}}, {{name: b, {clear}}}") == [
+        f'{not_drawn}body "b" of model "m"'
+    ]
+    assert lines(", ".join(f"{{name: {name}, {clear}}}" for name in "abcde")) == [
+        f'{not_drawn}body "a" of model "m", body "b" of model "m", body "c" of model "m" and 2 others',
+        "the picture is empty",
+    ]
+    assert lines("{name: a, footprints: []}") == [
+        "the picture is empty, because the world has neither walls nor footprints"
+    ]
+    outside = "the picture is empty, because everything is outside of the view: walls and models "
+    view = ("--view", "2", "2", "9", "9")
+    assert lines(f"{{name: a, {circle}}}", *view) == [f"{outside}extend from (-1, -1) to (1, 1)"]
+    files.write_map("room", ["#####", *["#...#"] * 3, "#####"])
+    assert lines(f"{{name: a, {circle}}}", *view, layers="[{name: w, map: room.yaml}]") == []
+
+
 def test_seed_makes_noise_repeatable(world_file, tmp_path):
     model = tmp_path / "robot.model.yaml"
     laser = "range: 9, always_publish: true, noise_std_dev: 0.05"
