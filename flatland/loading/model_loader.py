@@ -24,6 +24,13 @@ BODY_TYPES = ("static", "kinematic", "dynamic")
 FOOTPRINT_TYPES = ("circle", "polygon")
 JOINT_TYPES = ("revolute", "weld")
 BODY_COLOR = (1.0, 1.0, 1.0, 0.5)
+MAX_FOOTPRINTS = 10_000
+"""Largest number of footprints of a model."""
+MAX_MOVING_FOOTPRINTS = 1_000
+"""Largest number of footprints of the bodies of a model that are not static.
+
+Each of them may touch each other one, which is half a million contacts."""
+_MAX_LAYER_NAMES = 100  # of a footprint, which may be repeated
 
 T = TypeVar("T")
 
@@ -51,6 +58,8 @@ class ModelLoader:
         self._model = model
         self._place = f'model "{model.name}"'
         self._reader = reader.with_location(self._place)
+        # Number of footprints, and of those of bodies that are not static.
+        self._counts = [0, 0]
 
     def load_bodies_and_joints(self, pose: Pose) -> None:
         """Creates all bodies and joints.
@@ -125,6 +134,7 @@ class ModelLoader:
         class_name = read_class(reader, self._model.class_name)
         footprints = reader.subnode("footprints", "list")
         reader.ensure_accessed_all()
+        self._count_footprints(reader, len(footprints), body_type)
         physics_body = _create(
             reader,
             self._physics.create_body,
@@ -141,12 +151,33 @@ class ModelLoader:
             with footprint.collect_errors():
                 self._load_footprint(body, footprint)
 
+    def _count_footprints(self, reader: YamlReader, count: int, body_type: str) -> None:
+        """Checks the number of footprints before those of a body are created.
+
+        A short file can have many, because each alias of a list repeats all of its items.
+
+        Raises:
+            YamlError: The model has too many footprints with those of the body.
+        """
+        names = ("footprints", "footprints of bodies that are not static")
+        limits = (MAX_FOOTPRINTS, MAX_MOVING_FOOTPRINTS)
+        added = (count, 0 if body_type == "static" else count)
+        for i, (name, limit) in enumerate(zip(names, limits, strict=True)):
+            before, self._counts[i] = self._counts[i], self._counts[i] + added[i]
+            if self._counts[i] > limit:
+                text = (
+                    f'Invalid "footprints" in {reader.location} {reader.name}, the model must have '
+                    f"at most {limit} {name}, got {self._counts[i]} with those of this body"
+                )
+                hint = "each alias of a list repeats its items; several models may have more"
+                raise FollowUpError(text) if before > limit else reader.error(text, hint)
+
     def _load_footprint(self, body: Body, reader: YamlReader) -> None:
         place = f"{reader.location} {reader.name}"
         kind = reader.get("type", "string")
         problem = f'Invalid footprint "type" in {place}, support footprints are'
         is_known = _check_choice(reader, kind, FOOTPRINT_TYPES, problem)
-        layers = reader.get_list("layers", "string", ["all"])
+        layers = reader.get_list("layers", "string", ["all"], max_size=_MAX_LAYER_NAMES)
         unknown = self._layers.unknown(layers)
         if unknown:
             reader.report(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import functools
 import logging
+import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
 import numpy as np
 
@@ -37,6 +38,7 @@ TOPIC_SCHEME = "topic://"
 _MIN_KEPT = 0.99  # share of the length of all walls, below which a warning is logged
 MAX_MAGNITUDE = 1e9
 """Largest absolute value of a coordinate [m] or an angle [rad] of the physics."""
+_PROGRESS_PERIOD: Final = 5.0  # s between two messages about the models that are loaded
 LAYER_COLOR = (1.0, 1.0, 1.0, 1.0)
 MAX_ITERATIONS = 1000
 """Largest number of velocity or position iterations; more only slow down the simulation."""
@@ -312,9 +314,14 @@ def _load_map(source: WorldSource, reader: YamlReader, map_path: str, layer_name
 
 def _load_models(world: LoadedWorld, reader: YamlReader) -> None:
     names: set[str] = set()
-    for entry in reader.optional_subnode("models", "list").items():
+    entries = reader.optional_subnode("models", "list")
+    reported = time.monotonic()
+    for number, entry in enumerate(entries.items()):
         with entry.collect_errors():
             _load_model(world, entry, names)
+        if time.monotonic() - reported > _PROGRESS_PERIOD:
+            reported = time.monotonic()
+            _LOG.info("loaded %d of %d models", number + 1, len(entries))
 
 
 def _load_model(world: LoadedWorld, entry: YamlReader, names: set[str]) -> None:

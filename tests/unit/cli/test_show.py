@@ -95,7 +95,8 @@ def test_lines_say_what_a_picture_does_not_show(files, tmp_path, capsys):
         f'{not_drawn}body "b" of model "m"'
     ]
     assert lines(", ".join(f"{{name: {name}, {clear}}}" for name in "abcde")) == [
-        f'{not_drawn}body "a" of model "m", body "b" of model "m", body "c" of model "m" and 2 others',
+        f'{not_drawn}body "a" of model "m", body "b" of model "m", body "c" of model "m" '
+        "and 2 others",
         "the picture is empty",
     ]
     assert lines("{name: a, footprints: []}") == [
@@ -155,8 +156,8 @@ def test_invalid_files_exit_with_1_and_one_line_of_error(world_file, tmp_path, m
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["no/a.png"], "[Errno 2] No such file or directory: "),
-        (["a.png", "--layer", "roof"], 'Flatland World: layer with name "roof" does not exist\n'),
+        (["no/a.png"], "cannot write no/a.png: there is no folder no\n"),
+        (["a.png", "--layer", "roof"], 'Flatland World: layer with name "roof" does not exist (hint: '),
     ],
 )
 def test_what_cannot_be_drawn_is_an_error(

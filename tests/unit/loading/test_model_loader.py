@@ -8,6 +8,7 @@ import pytest
 
 import flatland
 from flatland.config.collecting_reader import ErrorCollector
+from flatland.loading import model_loader
 from flatland.loading.world_loader import load_world
 from flatland.loading.world_source import WorldSource
 
@@ -177,3 +178,47 @@ def test_a_value_takes_the_place_of_an_invalid_one(files):
     world, errors = collected(files, body(", type: flying"), "{publish_map: roof}")
     assert len(errors) == 2
     assert world.map_layer == ""
+
+
+@pytest.mark.parametrize(
+    ("kind", "limit", "what"),
+    [
+        ("static", "MAX_FOOTPRINTS", "footprints"),
+        ("dynamic", "MAX_MOVING_FOOTPRINTS", "footprints of bodies that are not static"),
+    ],
+)
+def test_the_number_of_footprints_of_a_model_is_limited(files, monkeypatch, kind, limit, what):
+    """A list that is repeated by aliases makes a short file large."""
+    monkeypatch.setattr(model_loader, limit, 6)
+    circle = "{type: circle, radius: 0.2, density: 1}"
+    bodies = "".join(f"- {{name: b{i}, type: {kind}, footprints: *f}}\n" for i in range(1, 5))
+    path = files.write(
+        "m.yaml",
+        f"bodies:\n- {{name: b0, type: {kind}, footprints: &f [{circle}, {circle}, {circle}]}}\n"
+        f"{bodies}",
+    )
+    text = (
+        'Invalid "footprints" in model "m" body "b2", the model must have at most 6 '
+        f"{what}, got 9 with those of this body [{path}:4]"
+    )
+    with flatland.World(seed=1) as world:
+        with pytest.raises(flatland.YamlError) as caught:
+            world.spawn_model(path, "m")
+        assert caught.value.message == text
+        assert world.models == []
+        assert world.physics.object_counts().bodies == 0
+    world_path = files.write(
+        "w.yaml", "properties: {}\nlayers: []\nmodels: [{name: m, model: m.yaml}]"
+    )
+    collector = ErrorCollector()
+    load_world(flatland.World, WorldSource(world_path, read=collector.read), seed=1).close()
+    assert [error.message for error in collector.errors] == [text]
+
+
+def test_the_number_of_layers_of_a_footprint_is_limited(files):
+    names = ", ".join(["all"] * 101)
+    circle = f"type: circle, radius: 0.2, density: 1, layers: [{names}]"
+    path = files.write("m.yaml", body(footprint=circle))
+    with flatland.World(seed=1) as world, pytest.raises(flatland.YamlError) as caught:
+        world.spawn_model(path, "m")
+    assert 'Entry "layers" must have size <= 100' in caught.value.message
