@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from flatland.config.hints import did_you_mean
 from flatland.errors import WorldError
 from flatland.geometry import DoubleArray, Vector2
 from flatland.loading.model_source import ModelSpec
@@ -226,8 +227,11 @@ class Pedestrians(WorldPlugin):
         for group in self._groups:
             if name in (None, "", group.name):
                 return group
-        known = listed(group.name for group in self._groups)
-        raise WorldError(f'group "{name}" does not exist; groups: {known}')
+        names = [group.name for group in self._groups]
+        raise WorldError(
+            f'group "{name}" does not exist; groups: {listed(names)}',
+            hint=did_you_mean(name or "", names),
+        )
 
     def _find_people(self, names: list[str] | None) -> list[Model]:
         models = {

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from flatland.config import hints
-from flatland.errors import FlatlandError
+from flatland.errors import FlatlandError, WorldError
 from flatland.geometry import compose, invert, transform_points
 from flatland.plugins.laser import Laser
 from flatland.plugins.pedestrians import Pedestrians
@@ -197,12 +197,16 @@ def find_drive(world: World, robot: Model, wanted: Robot) -> CommandTopic[object
         for name, commands in world.ports.commands.items()
         if any(command.value_type is Twist for command in commands)
     ]
-    drive = world.command(topic)
+    hint = hints.did_you_mean(f"/{topic.removeprefix('/')}", twists, "velocities")
+    try:
+        drive = world.command(topic)
+    except WorldError as error:
+        raise ScenarioError(error.message, hint=hint) from error
     if drive.value_type is not Twist:
         raise ScenarioError(
             f'the command "{topic}" of the robot "{robot.name}" must be a velocity, it is a '
             f"{drive.value_type.__name__}",
-            hint=hints.did_you_mean(topic, twists, "velocities"),
+            hint=hint,
         )
     return drive
 

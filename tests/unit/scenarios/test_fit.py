@@ -63,8 +63,8 @@ def problems(room, files):
         # Names.
         ("robot: robbot", 'the robot "robbot" does not exist', 'did you mean "robot"?'),
         ("robot: {laser: eye}", 'the world has no plugin "eye" of type Laser', ": laser"),
-        ("robot: {cmd_vel: cmd_val}", 'command "cmd_val" does not exist', ""),
-        ("people: [{group: visitors, count: 2}]", 'group "visitors" does not exist', ""),
+        ("robot: {cmd_vel: cmd_val}", 'command "cmd_val" does not exist', '"/cmd_vel"'),
+        ("people: [{group: visitors, count: 2}]", 'group "visitors" does not exist', '"visitor"'),
         ("events: [{at: 1, delete: pilar}]", 'model "pilar" does not exist', '"pillar"'),
         ("events: [{at: 1, delete: robot}]", "must not be the robot", ""),
         (
