@@ -92,5 +92,7 @@ def test_a_full_disk_ends_the_recordings_only(
     odometry = ros.topic("/odometry/ground_truth", Odometry)
     first = odometry.next().header.stamp
     assert odometry.until(lambda message: message.header.stamp > first)
-    assert server.stop() == 0
-    assert server.output.count("No space left on device") == 1
+    # The recording is incomplete.
+    assert server.stop() == 1
+    assert server.output.count("No space left on device") == 2
+    assert f'"{full}" is incomplete: No space left on device' in server.output

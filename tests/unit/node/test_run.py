@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
+from full_disk import REASON, limited_files
 from waiting import TIMEOUT, wait_until
 
 from flatland.errors import FlatlandError
@@ -140,3 +141,23 @@ def test_a_failure_is_the_exit_code_unless_a_stop_was_requested(
 
 def test_the_exit_code_of_a_run_without_a_failure_is_0(node: NodeRun) -> None:
     assert node.exit_code_of(lambda: None) == 0
+
+
+def test_a_recording_that_is_cut_is_named_at_the_end(
+    node: NodeRun, files: Any, transport: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = files.write("world.yaml", "{properties: {}, layers: []}")
+    recording = files.folder / "run.flog"
+    values = {"world_path": path, "record": str(recording), "update_rate": 0}
+    parameters = read_parameters(values.get)
+
+    @contextmanager
+    def more(served: ServedWorld) -> Iterator[None]:
+        served.simulation.post(node.watchdog.stop)  # type: ignore[attr-defined]
+        with limited_files(recording.stat().st_size):
+            yield
+            served.world.close()
+
+    clock = SimulatedClock(transport)
+    assert node.exit_code_of(lambda: node.serve(parameters, transport, clock, more)) == 1
+    assert f'"{recording}" is incomplete: {REASON}, at step ' in caplog.text
