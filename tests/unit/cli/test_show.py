@@ -157,7 +157,7 @@ def test_invalid_files_exit_with_1_and_one_line_of_error(world_file, tmp_path, m
     ("arguments", "message"),
     [
         (["no/a.png"], "cannot write no/a.png: there is no folder no\n"),
-        (["a.png", "--layer", "roof"], 'Flatland World: layer with name "roof" does not exist (hint: '),
+        (["a.png", "--layer", "roof"], 'Flatland World: layer with name "roof" does not exist'),
     ],
 )
 def test_what_cannot_be_drawn_is_an_error(
