@@ -71,19 +71,19 @@ _VALUES = {
 
 
 _NAN = "nan is the result of an invalid computation, such as 0/0"
-_NOT_A_NUMBER = re.compile(r"[-+]?(\.?nan(\(.*\))?|1\.#(ind|qnan|snan))\d*", re.IGNORECASE)
-_INFINITY = re.compile(r"[-+]?(\.?inf(inity)?|1\.#inf)\d*", re.IGNORECASE)
-_WITH_UNIT = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)) *([a-zA-Zµ%][a-zA-Zµ/%²^\d]*)")
+_NOT_A_NUMBER = r"(?i:[-+]?(\.?nan(\(.*\))?|1\.#(ind|qnan|snan))\d*)"
+_INFINITY = r"(?i:[-+]?(\.?inf(inity)?|1\.#inf)\d*)"
+_WITH_UNIT = r"([-+]?(?:\d+\.?\d*|\.\d+)) *([a-zA-Zµ%][a-zA-Zµ/%²^\d]*)"
 _SI = ["m", "meter", "meters", "s", "sec", "Hz", "hz", "kg", "N", "Nm", "rad", "rad/s", "m/s", "px"]
 _SI += ["rad/s²", "rad/s^2", "m/s²", "m/s^2", "m/s2", "kg/m²", "kg/m^2", "kg/m2"]
 _UNITS: dict[str, float] = dict.fromkeys(_SI, 1)
 _UNITS |= {"cm": 0.01, "mm": 0.001, "km": 1000, "cm/s": 0.01, "mm/s": 0.001, "km/h": 1 / 3.6}
 _UNITS |= {"ms": 0.001, "µs": 1e-6, "us": 1e-6, "min": 60, "kHz": 1000, "g": 0.001, "%": 0.01}
 _UNITS |= {"rpm": math.tau / 60}
-_ARITHMETIC = re.compile(
+_ARITHMETIC = (
     r"(?:\d++\.?+\d*+(?:e[-+]?\d++)?+|\.\d++|(?:math\.)?(?:pi|sqrt|sin|cos|tan|rad)|[-+*/(),\s])++"
 )
-_XACRO = re.compile(r"\$\{(.*)\}|\$\((?:eval|arg) (.*)\)")
+_XACRO = r"\$\{(.*)\}|\$\((?:eval|arg) (.*)\)"
 
 MAX_TURNS = 1.02
 """Full turns above which an angle is suspicious; it may be rounded up."""
@@ -217,7 +217,7 @@ def conversion(text: str, kind: str, location: str = "") -> str:
         location: Location of the scalar in error messages.
     """
     if kind in ("float", "int") and len(text) <= _MAX_SHOWN:
-        if _NOT_A_NUMBER.fullmatch(text):
+        if re.fullmatch(_NOT_A_NUMBER, text):
             return _NAN_ANGLE if _is_map_origin(location) else _NAN
         return _number(text, kind)
     if kind == "bool":
@@ -235,19 +235,19 @@ def _number(text: str, kind: str) -> str:
     """Returns a hint for a text that should be a number."""
     if re.fullmatch(r"[-+]?\d+,\d+", text):
         return f"decimals are written with a point: {text.replace(',', '.')}"
-    if _INFINITY.fullmatch(text):
+    if re.fullmatch(_INFINITY, text):
         return f"infinity is written {'-' if text.startswith('-') else ''}.inf"
     if match := re.fullmatch(r"([-+]?[\d.]+) *(?:deg|degrees?|°)(/s)?", text):
         what = "angular velocities are in rad/s" if match[2] else "angles are in radians"
         return f"{what}: $eval math.rad({match[1]})"
-    if match := _WITH_UNIT.fullmatch(text):
+    if match := re.fullmatch(_WITH_UNIT, text):
         factor = _UNITS.get(match[2])
         number = match[1] if factor in (None, 1) else f"{float(match[1]) * factor:.6g}"
         other = "" if factor is not None else ", but in SI units"
         return f"numbers are written without a unit{other or f': {number}'}"
     if kind == "int" and re.fullmatch(r"[-+]?\d+\.\d*", text):
         return f"a whole number without a point is required, such as {text.split('.')[0]}"
-    if match := _XACRO.fullmatch(text):
+    if match := re.fullmatch(_XACRO, text):
         inner = match[1] or match[2]
         expression = _expression(inner)
         meant = f": {expression}" if expression else ', such as $eval param("/name", 1)'
@@ -260,7 +260,7 @@ def _expression(text: str) -> str:
     """Returns the expression of Lua for a text, empty if the text is not arithmetic."""
     from flatland.config.lua import EvalError, evaluate  # late, since only mistakes need it
 
-    if not _ARITHMETIC.fullmatch(text):
+    if not re.fullmatch(_ARITHMETIC, text):
         return ""
     code = re.sub(r"(?<![\w.])(pi|sqrt|sin|cos|tan|rad)", r"math.\1", text.strip())
     try:
