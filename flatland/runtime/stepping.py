@@ -291,7 +291,8 @@ class Stepping:
                 if end != _LAST_CALLS:
                     # The core goes on with the next steps unless something else is to be done.
                     goes_on = (
-                        not is_paced
+                        n - made > 1
+                        and not is_paced
                         and not is_single
                         and not self._has_to_end(while_paused)
                         and host.is_prepared(self._observers.want_transforms)
