@@ -142,6 +142,7 @@ class _Fit:
         self._world = world
         self._collector = collector
         self._is_loaded = True
+        self._is_at_start = False
 
     def check(self, references: _References) -> bool:
         """Reports everything that does not fit; returns whether all files could be loaded."""
@@ -150,7 +151,8 @@ class _Fit:
         if stage is not None:
             timeline = _Timeline(self._scenario, [one.name for one in self._world.models])
             around = Surroundings(self._world, stage.robot, timeline.changing)
-            self._check_places(stage, around)
+            if self._is_at_start:
+                self._check_places(stage, around)
             self._check_poses(stage, around)
             self._check_events(stage, timeline, around)
             self._check_contacts(timeline, references)
@@ -243,6 +245,7 @@ class _Fit:
         for index, spawn in enumerate(scenario.models):
             with self._at("models", index):
                 add_model(world, spawn)
+        found = self._collector.found
         with self._at(_ROBOT):
             places = Places(world, robot, self._run.seed)
         if self._collector.found > found:
@@ -251,6 +254,7 @@ class _Fit:
         with self._at("start"):
             start = places.start(scenario.start)
             world.move_model(robot.name, start, if_blocked="refuse")
+            self._is_at_start = True
         people = find_people(world)
         for index, entry in enumerate(scenario.people):
             with self._at("people", index):

@@ -197,13 +197,13 @@ def test_what_may_be_right_is_no_problem(text, problems):
 
 def test_errors_have_the_line_of_their_entry(problems):
     found = problems(
-        "start: [2, 5, 0]\n"
+        "models: [{name: lid, model: box.model.yaml, pose: [4, 4, 0]}]\n"
         "goals:\n- [5, 5]\n- [0.5, 5]\n"
         "events:\n- {at: 1, delete: ghost}\n- {at: 90, delete: lid}\n"
         "require:\n- reached\n- no contact with ghost\n"
         "matrix:\n  .robot.max_speed: [0.5, 0.6]\n  size: [1, 2]\n"
     )
-    assert sorted(line for line, *_ in found) == [5, 7, 8, 11, 14]
+    assert sorted(line for line, *_ in found) == [2, 5, 7, 8, 11, 14]
 
 
 def test_errors_of_worlds_and_models_are_those_of_their_files(problems, room, files):
