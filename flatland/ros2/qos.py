@@ -37,6 +37,10 @@ STATIC_TRANSFORMS: Final = "/tf_static"
 _TRANSFORMS: Final = "/tf"
 _TRANSFORM_DEPTH: Final = 100  # messages; several nodes send some in each step
 _MAP: Final = "nav_msgs/msg/OccupancyGrid"
+UNKNOWN_NODE: Final = "_NODE_NAME_UNKNOWN_"
+"""Name of a node that has not been discovered completely."""
+_SOME: Final = "a subscriber"
+_RECEIVES_NOTHING: Final = "receives nothing, because it requires"
 
 
 def of_publisher(
@@ -61,29 +65,29 @@ def of_publisher(
 def refused(subscribers: Sequence[TopicEndpointInfo], offered: QoSProfile) -> list[str]:
     """Returns a text for each subscriber that requires more than a publisher offers.
 
+    If none of those that are known does, there is one text for a subscriber that is not known yet.
+
     Args:
-        subscribers: The subscribers of the topic.
+        subscribers: The subscribers of the topic that have been discovered.
         offered: Quality of service of the publisher.
     """
     texts = []
+    is_best_effort = offered.reliability == ReliabilityPolicy.BEST_EFFORT
+    reliable = "reliable messages: let it subscribe with best effort (the profile of sensor data)"
+    if offered is not CLOCK:
+        reliable += ", or start the simulator with reliable_sensors:=true"
+    stored = "stored messages: let it subscribe as volatile"
     for each in subscribers:
         name = f"{each.node_namespace.rstrip('/')}/{each.node_name}"
+        if each.node_name == UNKNOWN_NODE:
+            name = _SOME
         wanted = each.qos_profile
-        receives_nothing = f"{name} receives nothing, because it requires"
-        if (
-            wanted.reliability == ReliabilityPolicy.RELIABLE
-            and offered.reliability == ReliabilityPolicy.BEST_EFFORT
-        ):
-            remedy = "let it subscribe with best effort (the profile of sensor data)"
-            if offered is not CLOCK:
-                remedy += ", or start the simulator with reliable_sensors:=true"
-            texts.append(f"{receives_nothing} reliable messages: {remedy}")
-        if (
-            wanted.durability == DurabilityPolicy.TRANSIENT_LOCAL
-            and offered.durability == DurabilityPolicy.VOLATILE
-        ):
-            texts.append(f"{receives_nothing} stored messages: let it subscribe as volatile")
-    return texts
+        if wanted.reliability == ReliabilityPolicy.RELIABLE and is_best_effort:
+            texts.append(f"{name} {_RECEIVES_NOTHING} {reliable}")
+        is_stored = wanted.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        if is_stored and offered.durability == DurabilityPolicy.VOLATILE:
+            texts.append(f"{name} {_RECEIVES_NOTHING} {stored}")
+    return texts or [f"{_SOME} {_RECEIVES_NOTHING} {reliable if is_best_effort else stored}"]
 
 
 def of_viewer(publishers: Sequence[TopicEndpointInfo]) -> QoSProfile:

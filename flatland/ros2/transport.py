@@ -277,6 +277,7 @@ class ClockTopic(StateTopic):
         names = [
             f"{each.node_namespace.rstrip('/')}/{each.node_name}"
             for each in self._node.get_publishers_info_by_topic(self.topic)
+            if each.node_name != qos.UNKNOWN_NODE
         ]
         if own in names:
             names.remove(own)  # Several nodes may have one name.

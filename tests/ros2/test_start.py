@@ -11,7 +11,12 @@ import pytest
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.parameter import Parameter
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import (
+    DurabilityPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_profile_sensor_data,
+)
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 from waiting import wait_until
@@ -35,6 +40,23 @@ def test_a_signal_ends_the_node_with_code_0(
     assert program.wait() == 0
     assert fatal_lines(program) == []
     assert "Traceback" not in program.output
+
+
+def test_a_subscriber_that_requires_more_is_named(ros: Any, launcher: Any, world: Path) -> None:
+    program = launcher.server(ros, world)
+    ros.topic("/scan", LaserScan)
+    someone = "(/flatland_tests|a subscriber) receives nothing, because it requires"
+    program.wait_for_line(
+        rf'topic "/scan": {someone} reliable messages: let it subscribe with best effort '
+        r".*reliable_sensors:=true"
+    )
+    stored = QoSProfile(
+        depth=1,
+        reliability=ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+    ros.topic("/clock", Clock, stored)
+    program.wait_for_line(f'topic "/clock": {someone} (stored|reliable) messages: let it')
 
 
 @pytest.mark.parametrize(
@@ -86,9 +108,10 @@ def test_parameters_have_descriptions_and_ranges_and_are_read_at_the_start(
 
 
 def test_two_nodes_in_namespaces_with_remapped_topics(ros: Any, launcher: Any, world: Path) -> None:
+    programs = {}
     for namespace in ("/first", "/second"):
         remapping = ("-r", f"__ns:={namespace}", "-r", f"{namespace}/scan:={namespace}/laser")
-        launcher.server(ros, world, *remapping)
+        programs[namespace] = launcher.server(ros, world, *remapping)
     for namespace in ("/first", "/second"):
         topic = ros.topic(f"{namespace}/laser", LaserScan, qos_profile_sensor_data)
         assert len(topic.next().ranges) == 7
@@ -99,6 +122,10 @@ def test_two_nodes_in_namespaces_with_remapped_topics(ros: Any, launcher: Any, w
 
     # The names of the nodes of publishers are discovered separately.
     wait_until("/clock of both nodes", is_published_by_both)
+    for namespace, other in (("/first", "/second"), ("/second", "/first")):
+        text = f"/clock is also published by {other}/flatland_server: the time of all nodes"
+        programs[namespace].wait_for_line(text)
+        assert programs[namespace].output.count("is also published by") == 1
     topics = dict(ros.node.get_topic_names_and_types())
     assert not {"/first/scan", "/second/scan", "/scan", "/first/clock"} & topics.keys()
 
@@ -107,6 +134,8 @@ def test_time_of_a_client_with_use_sim_time(ros: Any, launcher: Any, world: Path
     launcher.server(ros, world, lockstep=True)
     clock = ros.topic("/clock", Clock, qos_profile_sensor_data)
     ros.wait_until_ready("/clock")
+    first = clock.next().clock
+    assert (first.sec, first.nanosec) == (0, 1)  # 0 is no time
     now = ros.step(1.0)
     clock.until(lambda message: message.clock.sec * 10**9 + message.clock.nanosec == now)
     assert now == 10**9
