@@ -190,10 +190,9 @@ def test_spawning(ros: Any) -> None:
     ]
     assert ok(spawn(ros, allow_renaming=True, uri=f"file://{uri}")).entity_name == "ball"
     ok(ros.call("/delete_entity", DeleteEntity, entity="b"))
-    assert failure(ros.call("/delete_entity", DeleteEntity, entity="b")) == (
-        Result.RESULT_NOT_FOUND,
-        'there is no entity "b"',
-    )
+    code, text = failure(ros.call("/delete_entity", DeleteEntity, entity="b"))
+    assert code == Result.RESULT_NOT_FOUND
+    assert text == 'there is no entity "b" (hint: entities: robot, box1, pillar, b_2, ball)'
 
 
 @pytest.mark.parametrize(
