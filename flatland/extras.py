@@ -6,11 +6,14 @@ import importlib
 from typing import Any
 
 from flatland.errors import FlatlandError
-from flatland.requirements import PACKAGES, install_command
+from flatland.requirements import PACKAGES, failure
 
 
 class MissingPackageError(FlatlandError, ImportError):
-    """An optional package is not installed; the text names the command that installs it."""
+    """An optional package is not installed, or cannot be imported.
+
+    The text names the cause and the command that helps.
+    """
 
 
 def require(module: str, need: str) -> Any:
@@ -28,12 +31,15 @@ def require(module: str, need: str) -> Any:
     """
     try:
         return importlib.import_module(module)
-    except ImportError as error:
+    except Exception as error:  # such as an AttributeError of a module for another numpy
         raise missing(module.partition(".")[0], need, error) from error
 
 
-def missing(module: str, need: str, error: ImportError) -> MissingPackageError:
+def missing(module: str, need: str, error: Exception) -> MissingPackageError:
     """Returns the error for a package whose import has failed; see `require` for the need."""
-    reason = str(error).partition("\n")[0]
+    reason = str(error).strip().partition("\n")[0]
     name = PACKAGES[module].name
-    return MissingPackageError(f"{need} {name} ({reason}): {install_command(module)}")
+    cause, remedy = failure(module, reason)
+    if cause == "not installed":
+        return MissingPackageError(f"{need} {name} ({reason}): {remedy}")
+    return MissingPackageError(f"{need} {name}, which is {cause}: {remedy}")

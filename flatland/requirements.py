@@ -5,7 +5,9 @@ The module imports only the standard library: `flatland doctor` loads it without
 
 from __future__ import annotations
 
+import importlib.metadata
 import importlib.util
+import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,6 +57,14 @@ PACKAGES: Final = {
 
 REQUIRED: Final = ("numpy", "yaml", "lupa", "PIL")
 
+_ABI_VERSION: Final = 2
+"""The version of numpy with which modules that were built for earlier ones cannot be imported."""
+# What numpy and modules that were built for another version of it raise.
+_OTHER_ABI: Final = re.compile(
+    r"numpy\.(core|_core)\.\w+ failed to import|_ARRAY_API not found|_UFUNC_API not found"
+    r"|binary incompatibility|compiled (using|against).*(NumPy|ABI|API)",
+    re.IGNORECASE,
+)
 DEBIAN: Final = "Debian and ROS"
 CATKIN: Final = "catkin workspace"
 WHEEL: Final = "wheel"
@@ -90,6 +100,56 @@ def install_command(module: str) -> str:
     if package.extra and way != CATKIN:
         return f'pip install "flatland-sim[{package.extra}]"'
     return f"pip install {package.pip}"
+
+
+def failure(module: str, reason: str) -> tuple[str, str]:
+    """Returns why a module cannot be imported, and the command that helps.
+
+    Args:
+        module: Name of the module; its package need not be one of `PACKAGES`.
+        reason: Text of the exception that its import raised.
+
+    Returns:
+        The cause, such as `not installed`, and the command; empty for an unknown package.
+    """
+    package = module.partition(".")[0]
+    folder = _folder_of(package)
+    if not folder:
+        return "not installed", install_command(package) if package in PACKAGES else ""
+    if _OTHER_ABI.search(reason) and package != "numpy":
+        version = importlib.metadata.version("numpy")
+        if int(version.partition(".")[0]) >= _ABI_VERSION:
+            remedy = f'pip install "numpy<{_ABI_VERSION}"'
+        else:
+            remedy = f"pip install --force-reinstall {package}"
+        return (
+            f"installed in {folder}, but its binary interface does not fit numpy {version} in "
+            f"{_folder_of('numpy')}",
+            remedy,
+        )
+    return f"installed in {folder}, but its import fails: {reason}", _reinstall_command(package)
+
+
+def _folder_of(package: str) -> str:
+    """Returns the folder that contains an installed package, empty for none."""
+    try:
+        spec = importlib.util.find_spec(package)
+    except (ImportError, ValueError):
+        return ""
+    if spec is None:
+        return ""
+    places = [spec.origin] if spec.origin else list(spec.submodule_search_locations or [""])
+    path = Path(places[0])
+    return str(path.parent.parent if path.name == "__init__.py" else path.parent)
+
+
+def _reinstall_command(package: str) -> str:
+    """Returns the command that installs a package again, empty for an unknown one."""
+    if package not in PACKAGES:
+        return ""
+    command = install_command(package)
+    option = "--reinstall" if command.startswith("apt-get") else "--force-reinstall"
+    return command.replace(" install ", f" install {option} ", 1)
 
 
 def check_requirements() -> None:

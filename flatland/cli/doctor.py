@@ -282,7 +282,8 @@ def _check_modules(
         if works:
             yield Finding(section, name, "ok", f"{text or 'installed'}{purpose}")
         else:
-            yield Finding(section, name, failed, f"import fails: {text}{purpose}", remedy)
+            cause, help_for_cause = _load("requirements").failure(module, text)
+            yield Finding(section, name, failed, f"{cause}{purpose}", help_for_cause or remedy)
 
 
 def _import(modules: Sequence[str]) -> dict[str, tuple[bool, str]]:

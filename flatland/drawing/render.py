@@ -209,5 +209,5 @@ def check_matplotlib() -> None:
     """
     try:
         import flatland.drawing.painter  # noqa: F401
-    except ImportError as error:
+    except Exception as error:  # see `require`
         raise missing("matplotlib", "drawing needs", error) from error

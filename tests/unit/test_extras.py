@@ -12,6 +12,7 @@ import pytest
 from programs import run_program
 
 from flatland import requirements
+from flatland.extras import MissingPackageError, require
 
 BLOCKED = """
 import sys
@@ -204,3 +205,40 @@ def test_a_clone_without_extension_names_what_it_hides(tmp_path: Path, checkout:
     command.insert(1, "-P")
     done = run_program(command, cwd=clone, check=True)
     assert done.stdout.startswith(str(checkout)) or "site-packages" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "version", "cause", "remedy"),
+    [
+        (
+            "ImportError('numpy.core.multiarray failed to import')",
+            "2.4.6",
+            "but its binary interface does not fit numpy 2.4.6 in /",
+            'pip install "numpy<2"',
+        ),
+        (
+            "ValueError('numpy.dtype size changed, may indicate binary incompatibility')",
+            "1.24.2",
+            "but its binary interface does not fit numpy 1.24.2 in /",
+            "pip install --force-reinstall cv2",
+        ),
+        ("RuntimeError('broken')", "1.24.2", "but its import fails: broken", " --reinstall "),
+    ],
+)
+def test_an_installed_package_that_cannot_be_imported_names_the_cause(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    text: str,
+    version: str,
+    cause: str,
+    remedy: str,
+) -> None:
+    (tmp_path / "cv2.py").write_text(f"raise {text}")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "cv2", raising=False)
+    monkeypatch.setattr("importlib.metadata.version", lambda _name: version)
+    with pytest.raises(MissingPackageError) as caught:
+        require("cv2", "videos need")
+    error = str(caught.value)
+    assert error.startswith(f"videos need OpenCV, which is installed in {tmp_path}, {cause}")
+    assert remedy in error.rpartition(": ")[2]

@@ -201,6 +201,7 @@ PROVOKED: dict[str, Callable[[Case], str]] = {
 }
 WRITTEN_IN = {
     "Debian packages are missing": "tools/apt_packages.sh",
+    "A package is installed, but cannot be imported": "flatland/requirements.py",
     "`make run WORLD=…` does not find the world": "tools/run.sh",
     "The node ends immediately: no world": "flatland/node/parameters.py",
     "The node does not start": "flatland/ros/node.py",

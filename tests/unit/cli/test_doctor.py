@@ -96,8 +96,20 @@ def test_a_module_that_cannot_be_imported(tmp_path, monkeypatch, text, reason):
     modules = [("broken_module", "broken", "repair it", ""), ("json", "json", "", "")]
     broken, fine = doctor._check_modules("tools", modules, required=True)
     assert (broken.status, broken.remedy) == ("missing", "repair it")
-    assert broken.detail.startswith(reason)
+    assert broken.detail.startswith(f"installed in {tmp_path}, but its {reason}")
     assert fine.status == "ok"
+
+
+def test_a_module_that_does_not_fit_numpy_names_the_cause(tmp_path, monkeypatch):
+    (tmp_path / "cv2.py").write_text("raise AttributeError('_ARRAY_API not found')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr("importlib.metadata.version", lambda _name: "2.4.6")
+    (found,) = doctor._check_modules("tools", [("cv2", "OpenCV", "apt-get install x", "videos")])
+    assert found.detail.startswith(
+        f"installed in {tmp_path}, but its binary interface does not fit numpy 2.4.6 in /"
+    )
+    assert (found.status, found.remedy) == ("absent", 'pip install "numpy<2"')
 
 
 def test_a_program_that_does_not_end_is_stopped(monkeypatch):
