@@ -200,3 +200,13 @@ def test_a_layer_counts_its_edges_before_simplification(files):
     simple = files.load(layers, simplify_map=2).layer("2d")
     assert simple.exact_edge_count == exact.exact_edge_count == len(exact.edges)
     assert len(simple.edges) < simple.exact_edge_count
+
+
+def test_names_of_models_in_a_file(files):
+    files.write("box.model.yaml", "bodies: [{name: b, footprints: []}]")
+    world = "{{properties: {{}}, layers: [], models: [{{name: {}, model: box.model.yaml}}]}}"
+    for name in ("my robot-1", "../x", "a/b", "ä" * 255):
+        assert files.load(world.format(f'"{name}"')).models[0].name == name
+    for name in (r"a\0b", r"a\nb", r"\e[2J", "x" * 256):
+        with pytest.raises(flatland.YamlError, match=r"its name must have at most .*yaml:1\]$"):
+            files.load(world.format(f'"{name}"'))
