@@ -20,7 +20,7 @@ from flatland.checks import checked_names, checked_path, checked_range
 from flatland.drawing.layout import Layout, checked_view, default_view
 from flatland.errors import FlatlandError
 from flatland.extras import missing
-from flatland.output_files import replaced
+from flatland.output_files import write_bytes
 from flatland.scene.world_scene import Scene, describe_world
 
 if TYPE_CHECKING:
@@ -157,11 +157,13 @@ def save(
     if suffix not in PICTURE_FORMATS:
         raise ValueError(f"path must end with one of {', '.join(PICTURE_FORMATS)}, got {path!r}")
     figure = make_figure(world, **options)
-    with replaced(path) as part, MATPLOTLIB_LOCK:
+    file = io.BytesIO()  # matplotlib does not always raise the error of a full disk.
+    with MATPLOTLIB_LOCK:
         if suffix == ".png":
-            figure.canvas.print_png(part)
+            figure.canvas.print_png(file)
         else:
-            figure.savefig(part, format=suffix[1:])
+            figure.savefig(file, format=suffix[1:])
+    write_bytes(path, file.getvalue())
 
 
 def lay_out(world: World, picture: Picture) -> tuple[Scene, Layout]:

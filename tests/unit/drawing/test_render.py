@@ -9,6 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from full_disk import REASON, limited_files
 from matplotlib.text import Text
 from programs import run_program
 
@@ -393,6 +394,18 @@ class TestSave:
     def test_vector_formats(self, files, tmp_path):
         drawing.save(room_world(files, body()), tmp_path / "a.svg")
         assert (tmp_path / "a.svg").read_bytes().startswith(b"<?xml")
+
+    @pytest.mark.parametrize("name", ["a.png", "a.svg", "a.pdf"])
+    def test_a_full_disk_leaves_no_picture(self, files, tmp_path, name):
+        world = room_world(files, body())
+        drawing.save(world, tmp_path / name)  # Modules and fonts are loaded.
+        (tmp_path / name).write_text("old")
+        before = set(tmp_path.iterdir())
+        with limited_files(1000), pytest.raises(OSError, match=REASON) as caught:
+            drawing.save(world, tmp_path / name)
+        assert caught.value.filename == str(tmp_path / name)
+        assert (tmp_path / name).read_text() == "old"
+        assert set(tmp_path.iterdir()) == before
 
     def test_unknown_extension_raises(self, empty_world):
         with pytest.raises(ValueError, match=r"must end with one of .png, .pdf, .svg"):

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 import yaml
+from full_disk import REASON, limited_files
 from programs import run_program
 
 from flatland.maps.line_segments import read_line_segments
@@ -120,6 +121,22 @@ def test_existing_file_is_not_overwritten_without_force(image_map, out, existing
     assert "--force" in captured.err
     assert main([str(image_map), str(out), "-i", "--force"]) == 0
     assert (out / existing).read_bytes() != b"existing"
+
+
+def test_a_full_disk_leaves_no_file(image_map, out, capsys):
+    # Before the image, which is the largest file.
+    assert main([str(image_map), str(out), "-i"]) == 0
+    capsys.readouterr()
+    sizes = sorted((out / name).stat().st_size for name in names(out))
+    for size in (sizes[0] - 1, sizes[-1] - 1):
+        for name in names(out):
+            (out / name).write_text("old")
+        with limited_files(size):
+            assert main([str(image_map), str(out), "-i", "--force"]) == 1
+        captured = capsys.readouterr()
+        assert f"{REASON}: '{out}/map_lines." in captured.err
+        assert "Wrote" not in captured.out
+        assert {(out / name).read_text() for name in names(out)} == {"old"}
 
 
 def test_existing_image_is_no_conflict_without_image_option(image_map, out):

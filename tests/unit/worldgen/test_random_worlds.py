@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
+from full_disk import REASON, limited_files
 from programs import run_program
 
 import flatland
@@ -162,6 +163,13 @@ def test_another_robot_is_that_of_its_file(tmp_path: Path) -> None:
     assert not (path.parent / "robot.model.yaml").exists()
     with flatland.World.from_yaml(path) as world:
         assert [body.name for body in world.model("robot").bodies] == ["base"]
+
+
+def test_a_full_disk_leaves_no_folder(tmp_path: Path) -> None:
+    with limited_files(1000), pytest.raises(OSError, match=REASON) as caught:
+        worldgen.maze(1, SMALL).write(tmp_path / "lab")
+    assert caught.value.filename.startswith(f"{tmp_path}/lab/")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_existing_folder_is_not_changed(tmp_path: Path) -> None:
