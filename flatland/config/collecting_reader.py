@@ -347,12 +347,15 @@ class CollectingReader(YamlReader):
         node = self._find_quietly(key) or self._node
         return FollowUpError(error.message) if is_follow_up else _about(error, node)
 
-    def warn(self, key: Key, what: str, hint: str = "") -> None:
+    def warn(self, key: Key, what: str | Callable[[], str], hint: str = "") -> None:
         """Logs a warning about the value of an entry."""
+        text = what if isinstance(what, str) else what()
+        if not text:
+            return
         entry = self._reader(self._find_quietly(key) or self._node, key)
         # Of an item, the name of the list.
         name = entry.name if isinstance(key, str) else re.findall(r'"\w*"', entry.location)[-1]
-        _LOG.warning("%s is %s", name, what, extra={"place": entry.place, "hint": hint})
+        _LOG.warning("%s is %s", name, text, extra={"place": entry.place, "hint": hint})
 
     def report(self, error: FlatlandError) -> None:
         """Adds an error; within `attempt`, raises the error."""

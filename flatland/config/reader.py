@@ -458,12 +458,13 @@ class YamlReader:
 
     # -- collection of errors, see `flatland.config.collecting_reader` -------------------------
 
-    def warn(self, key: Key, what: str, hint: str = "") -> None:
+    def warn(self, key: Key, what: str | Callable[[], str], hint: str = "") -> None:
         """Does nothing; a reader that collects errors logs a warning about a valid value.
 
         Args:
             key: Key of the entry.
-            what: The value, and why it is suspicious.
+            what: The value, and why it is suspicious; or a function that returns this, or an empty
+                string for no warning.
             hint: What probably helps.
         """
 

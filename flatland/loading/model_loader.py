@@ -15,6 +15,7 @@ from flatland.entities.joint import Joint
 from flatland.entities.model import Model
 from flatland.errors import PhysicsError
 from flatland.geometry import IDENTITY, Pose, compose
+from flatland.loading.footprints import hull_problem
 from flatland.loading.materials import read_class, read_color, read_material
 from flatland.physics import PhysicsJoint, PhysicsWorld
 
@@ -211,6 +212,7 @@ class ModelLoader:
             points = reader.get_list("points", "vector", min_size=3, max_size=8, finite=True)
             reader.ensure_accessed_all()
             fixture = _create(reader, body.create_polygon, points, **properties)
+            reader.warn("points", lambda: hull_problem(points, fixture.vertices))
         if material is not None:
             fixture.material = material
 

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <string>
 
+#include "vec.h"
+#include "world/convex_hull.h"
 #include "world/errors.h"
 
 namespace flatland {
@@ -15,50 +17,6 @@ namespace {
 
 // A bound of the rounding error of an area or a moment of inertia, relative to the largest summand.
 constexpr float kRounding = 4.0F * b2_epsilon;
-
-// Returns the points that Box2D keeps. Box2D drops a point that is closer to an earlier point than
-// half of the linear slop.
-std::vector<b2Vec2> weld_points(const std::vector<b2Vec2>& points) {
-  constexpr float min_distance = 0.5F * b2_linearSlop;
-  std::vector<b2Vec2> kept;
-  for (const b2Vec2& point : points) {
-    const bool is_new = std::none_of(kept.begin(), kept.end(), [&](const b2Vec2& other) {
-      return b2DistanceSquared(point, other) < min_distance * min_distance;
-    });
-    if (is_new) kept.push_back(point);
-  }
-  return kept;
-}
-
-// Computes the hull like b2PolygonShape::Set, with the same rounding. Returns fewer than 3 points
-// if there is no hull, or if the gift wrapping does not terminate due to rounding.
-std::vector<b2Vec2> wrap_hull(const std::vector<b2Vec2>& points) {
-  const auto is_more_right = [](const b2Vec2& a, const b2Vec2& b) {
-    return a.x < b.x || (a.x == b.x && a.y > b.y);
-  };
-  const auto start = static_cast<std::size_t>(
-      std::max_element(points.begin(), points.end(), is_more_right) - points.begin());
-  std::vector<b2Vec2> hull;
-  std::size_t at = start;
-  do {
-    if (hull.size() == static_cast<std::size_t>(b2_maxPolygonVertices)) return {};
-    hull.push_back(points[at]);
-    std::size_t next = 0;
-    for (std::size_t candidate = 1; candidate < points.size(); ++candidate) {
-      if (next == at) {
-        next = candidate;
-        continue;
-      }
-      const b2Vec2 to_next = points[next] - hull.back();
-      const b2Vec2 to_candidate = points[candidate] - hull.back();
-      const float turn = b2Cross(to_next, to_candidate);
-      const bool is_farther = to_candidate.LengthSquared() > to_next.LengthSquared();
-      if (turn < 0.0F || (turn == 0.0F && is_farther)) next = candidate;
-    }
-    at = next;
-  } while (at != start);
-  return hull;
-}
 
 bool has_area(const b2Vec2* hull, std::size_t count) {
   if (count < 3) return false;
@@ -71,6 +29,30 @@ bool has_area(const b2Vec2* hull, std::size_t count) {
     longest = std::max({longest, a.LengthSquared(), b.LengthSquared()});
   }
   return area > std::max(2.0F * b2_epsilon, kRounding * longest);
+}
+
+// Returns the polygon with these corners, which form a convex polygon in this order. Box2D would
+// compute the hull of the corners again, with a rounding error that can lose a corner.
+b2PolygonShape polygon_of(const std::vector<b2Vec2>& corners) {
+  b2PolygonShape polygon;
+  polygon.m_count = static_cast<int32>(corners.size());
+  const Vec origin = to_vec(corners[0]);
+  Vec moment;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const b2Vec2 next = corners[(i + 1) % corners.size()];
+    b2Vec2 normal = b2Cross(next - corners[i], 1.0F);
+    normal.Normalize();
+    polygon.m_vertices[i] = corners[i];
+    polygon.m_normals[i] = normal;
+    const Vec a = to_vec(corners[i]) - origin;
+    const Vec b = to_vec(next) - origin;
+    moment += cross(a, b) / 3.0 * (a + b);
+    sum += cross(a, b);
+  }
+  const Vec centroid = origin + moment / sum;
+  polygon.m_centroid.Set(static_cast<float>(centroid.x), static_cast<float>(centroid.y));
+  return polygon;
 }
 
 }  // namespace
@@ -87,13 +69,15 @@ b2PolygonShape make_polygon(const std::vector<b2Vec2>& points) {
     throw std::invalid_argument("a polygon must have 3 to 8 points, got " +
                                 std::to_string(points.size()));
   }
+  const std::vector<b2Vec2> corners = exact_hull(points);
   const std::vector<b2Vec2> distinct = weld_points(points);
+  const std::vector<b2Vec2> hull = box2d_hull(distinct);
+  if (has_area(corners.data(), corners.size()) && !has_corners(hull, corners)) return polygon_of(corners);
   if (distinct.size() < 3) {
     throw std::invalid_argument(
         "a polygon must have at least 3 points that are at least 2.5 mm apart, got " +
         std::to_string(distinct.size()));
   }
-  const std::vector<b2Vec2> hull = wrap_hull(distinct);
   if (!has_area(hull.data(), hull.size())) {
     throw std::invalid_argument(
         "a polygon must have a positive area, but its points are collinear");

@@ -17,9 +17,9 @@ inline constexpr float kMinEdgeLength = b2_epsilon;
 // Returns a circle; a circle of radius 0 is a point. Throws std::invalid_argument.
 b2CircleShape make_circle(double x, double y, double radius);
 
-// Returns the convex hull of 3 to 8 points. Throws std::invalid_argument if there are too few
-// points, too few of them are distinct (Box2D welds points closer than 2.5 mm), or the hull has no
-// area.
+// Returns the convex hull of 3 to 8 points: that of Box2D, bit by bit, or the exact one if a corner
+// is missing from it. Throws std::invalid_argument if there are too few points, too few of them are
+// distinct (Box2D welds points closer than 2.5 mm), or the hull has no area.
 b2PolygonShape make_polygon(const std::vector<b2Vec2>& points);
 
 // Sets a two-sided edge. Returns false if it is shorter than kMinEdgeLength.

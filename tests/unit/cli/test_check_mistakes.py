@@ -55,6 +55,13 @@ def of_world(text: str, *problems: tuple[str, int | None, str, str], **files: st
     return Mistake({"world.yaml": text, **others}, list(problems))
 
 
+def polygon(points: str) -> str:
+    """Returns a model with a polygon."""
+    return (
+        f"bodies: [{{name: base, footprints: [{{type: polygon, density: 1, points: {points}}}]}}]"
+    )
+
+
 def of_model(text: str, *problems: tuple[str, int | None, str, str]) -> Mistake:
     return Mistake({"robot.yaml": text}, list(problems))
 
@@ -337,6 +344,26 @@ MISTAKES: dict[str, Mistake] = {
         ),
         ("robot.yaml", 1, '~"color" is [255, 0, 0, 255], but each of [r, g, b, a] is from', ""),
         ("robot.yaml", 1, '~"radius" is 0, so that the circle is a point', ""),
+    ),
+    "a concave footprint": of_model(
+        polygon("[[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]"),
+        (
+            "robot.yaml",
+            1,
+            '~"points" is concave; the physics uses the convex hull, with an area of 3.5 m² '
+            "instead of 3 m²",
+            "",
+        ),
+    ),
+    "a footprint that crosses itself": of_model(
+        polygon("[[0, 0], [2, 1], [2, 0], [0, 1]]"),
+        (
+            "robot.yaml",
+            1,
+            '~"points" is a polygon that crosses itself; the physics uses its convex hull, with '
+            "an area of 2 m²",
+            "",
+        ),
     ),
     # Conflicts of plugins.
     "two lasers of one frame without transforms": of_model(
