@@ -1133,9 +1133,42 @@ class Crowd(Handle):
             ValueError: A waypoint or the order does not exist, or a coordinate is not finite.
         """
     def reach(self, waypoint: int) -> int:
-        """Returns the number of cells of the planning grid from which a way leads to a waypoint."""
+        """Returns the number of cells of the planning grid from which a way leads to a waypoint.
+
+        It is 1 for a waypoint outside of the walls, to which no way is computed before it is needed.
+
+        Raises:
+            PhysicsError: The grid would have too many cells.
+        """
+    @property
+    def region(self) -> tuple[float, float, float, float] | None:
+        """The part (x_min, y_min, x_max, y_max) of the world for which ways are computed [m].
+
+        None for the whole world. In a world that is too large, it is that of the waypoints and the walls
+        around them; without waypoints, that of the most walls that belong together.
+
+        Raises:
+            PhysicsError: The grid would have too many cells.
+        """
+    def walls_apart_from(self, place: Sequence[float]) -> tuple[float, float, float, float] | None:
+        """Returns the bounds of the walls if a place is outside of them, more than 1 m away.
+
+        Args:
+            place: The place [m], world frame.
+
+        Returns:
+            Bounds (x_min, y_min, x_max, y_max) of the walls near the people [m], None if the place is not
+            outside or there are no walls.
+
+        Raises:
+            PhysicsError: The grid would have too many cells.
+        """
     def way(self, waypoint: int, place: Sequence[float]) -> tuple[float, float]:
-        """Returns the direction of the way from a place to a waypoint, (0, 0) if there is none."""
+        """Returns the direction of the way from a place to a waypoint, (0, 0) if there is none.
+
+        Raises:
+            PhysicsError: The grid would have too many cells.
+        """
     def add_party(self, route: int, first_leg: int, members: Sequence[Member]) -> None:
         """Adds people who walk together, or a single person.
 
@@ -1164,6 +1197,7 @@ class Crowd(Handle):
 
         Raises:
             ValueError: A coordinate is not finite, or a body is not that of a person.
+            PhysicsError: The grid would have too many cells; nobody is sent.
         """
     def set_key(self, key: int) -> None:
         """Sets the integer from which all further random numbers derive."""
@@ -1572,6 +1606,7 @@ class RangeFinder:
         range_min: float = 0.0,
         no_hit: float = ...,
         noise: RangeNoise | None = None,
+        out_of_range: str = "keep",
         uses_materials: bool = True,
         is_cone: bool = False,
     ) -> None:
@@ -1588,6 +1623,9 @@ class RangeFinder:
                 ranges negative.
             no_hit: Range that is reported for a beam without a hit [m].
             noise: Noise model; None for exact ranges.
+            out_of_range: What becomes of a hit whose range is below `range_min` or above `length` because
+                of normal noise: `keep`, `clamp` to these limits, or `drop`, which reports -inf and `no_hit`
+                instead.
             uses_materials: Whether materials let beams pass and reflect them; otherwise each fixture stops
                 all beams.
             is_cone: Whether there is a single reading, that of the nearest hit of all beams.

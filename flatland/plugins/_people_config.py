@@ -80,6 +80,11 @@ class Stop:
     spacing: float
     reader: YamlReader
 
+    @property
+    def center(self) -> Span:
+        """The point, or the center of the area [m]."""
+        return ((self.low[0] + self.high[0]) / 2, (self.low[1] + self.high[1]) / 2)
+
 
 @dataclass(frozen=True)
 class Group:

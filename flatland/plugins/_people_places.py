@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from flatland.errors import WorldError
-from flatland.geometry import DoubleArray, Vector2
+from flatland.errors import PhysicsError, WorldError
+from flatland.geometry import Bounds, DoubleArray, Vector2
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from flatland.plugins._people_config import Group, Stop
 
 CLEARANCE: Final = 0.02  # least gap between a person on a way and a wall [m]
+_TOO_LARGE: Final = 'increase "cell", or bring waypoints and walls together'
 _WANDER_RADIUS: Final = 0.7  # distance at which a random place is reached [m]
 _MOST_DRAWS: Final = 6  # number of attempts to find free places, each with twice as many places
 
@@ -65,8 +66,23 @@ class PeoplePlaces:
         self._crowd.add_party(route, first, members)
 
     def has_way(self, waypoint: int, place: Vector2) -> bool:
-        """Returns whether there is a way from a place [m] to a waypoint."""
-        return self._crowd.way(waypoint, place) != (0.0, 0.0)
+        """Returns whether there is a way from a place [m] to a waypoint.
+
+        Raises:
+            WorldError: Ways cannot be computed, because the world is too large.
+        """
+        try:
+            return self._crowd.way(waypoint, place) != (0.0, 0.0)
+        except PhysicsError as error:
+            raise WorldError(str(error)) from error
+
+    def describe_outside(self, place: Vector2) -> str:
+        """Returns a clause about a place [m] outside of the walls, empty for other places."""
+        bounds = self._crowd.walls_apart_from(place)
+        if bounds is None:
+            return ""
+        corners = "from ({:.6g}, {:.6g}) to ({:.6g}, {:.6g})".format(*bounds)
+        return f", which is outside of the walls, which extend {corners}"
 
     def find_free(self, group: Group, count: int) -> DoubleArray:
         """Returns free poses from which there is a way to the first waypoint of a group.
@@ -87,7 +103,12 @@ class PeoplePlaces:
             if len(with_way) >= count:
                 return np.array(with_way[:count]).reshape(-1, 3)
             wanted *= 2
-        raise WorldError(f"found only {len(with_way)} of {count} free places with a way")
+        where = ""
+        if group.stops and not with_way:
+            x, y = group.stops[0].center
+            outside = self.describe_outside((x, y))
+            where = f" to the waypoint ({x:g}, {y:g}){outside}"
+        raise WorldError(f"found only {len(with_way)} of {count} free places with a way{where}")
 
     def _add_stop(self, stop: Stop) -> int:
         waypoint = self._crowd.add_waypoint(
@@ -98,7 +119,14 @@ class PeoplePlaces:
             is_queue=stop.is_queue,
             spacing=stop.spacing,
         )
-        if not self._crowd.reach(waypoint):
+        try:
+            reach = self._crowd.reach(waypoint)
+        except PhysicsError as error:
+            x, y = stop.center
+            raise stop.reader.error(
+                f"A waypoint at ({x:g}, {y:g}) is too far away: {error}", _TOO_LARGE
+            ) from error
+        if not reach:
             raise stop.reader.error("A waypoint is not in the free space: no person fits there")
         return waypoint
 
@@ -125,7 +153,7 @@ class PeoplePlaces:
         """Samples `count` free poses, or at least `least` if there is too little space."""
         inside = [layer for layer in self._world.layers if layer.category_bits & self._bits]
         layers = [name for layer in inside for name in layer.names]
-        radius, area = group.radius, group.area
+        radius, area = group.radius, group.area or self._region()
         if area is None and not any(len(layer.edges) for layer in inside):
             raise WorldError('"area" is required, because the layers have no walls')
         while True:
@@ -138,6 +166,13 @@ class PeoplePlaces:
                 if count <= (least or 2):
                     raise
                 count = max(least or 2, count // 2)
+
+    def _region(self) -> Bounds | None:
+        """Returns the part of the world for which ways are computed, None for the whole world."""
+        try:
+            return self._crowd.region
+        except PhysicsError as error:
+            raise WorldError(str(error), hint=_TOO_LARGE) from error
 
 
 def _pair(place: DoubleArray) -> Vector2:

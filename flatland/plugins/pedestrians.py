@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from flatland.config.hints import did_you_mean
-from flatland.errors import WorldError
+from flatland.errors import PhysicsError, WorldError
 from flatland.geometry import DoubleArray, Vector2
 from flatland.loading.model_source import ModelSpec
 from flatland.physics import Member
-from flatland.plugin_api.parameters import read_choice, read_positive, read_rate
+from flatland.plugin_api.parameters import MAX_COORDINATE, read_choice, read_positive, read_rate
 from flatland.plugin_api.plugin import WorldPlugin
 from flatland.plugins._people_config import (
     BODY_TYPES,
@@ -170,7 +170,8 @@ class Pedestrians(WorldPlugin):
         """Makes people walk to a place [m] and stand there until `resume`; None for everybody.
 
         Raises:
-            WorldError: There is no person of a name, or nobody fits at the place.
+            WorldError: There is no person of a name, or there is no way to the place, for example
+                because it is outside of the walls.
             ValueError: The goal is not finite.
         """
         self._direct(names, "send", (float(goal[0]), float(goal[1])))
@@ -216,12 +217,17 @@ class Pedestrians(WorldPlugin):
         place = (goal[0], goal[1])
         if not (math.isfinite(place[0]) and math.isfinite(place[1])):
             raise ValueError(f"the goal must be finite [m], got {place}")
-        stranded = self._crowd.send([_body(model) for model in models], place, _GOAL_RADIUS)
+        shown = f"the goal ({place[0]:g}, {place[1]:g})"
+        if max(abs(place[0]), abs(place[1])) > MAX_COORDINATE:
+            raise WorldError(f"{shown} is beyond the greatest coordinate, {MAX_COORDINATE:g} m")
+        try:
+            stranded = self._crowd.send([_body(model) for model in models], place, _GOAL_RADIUS)
+        except PhysicsError as error:
+            raise WorldError(f"nobody can be sent to {shown}: {error}") from error
         if stranded is not None:
             name, _ = self._names[stranded]
-            raise WorldError(
-                f'there is no way for "{name}" to the goal ({place[0]:g}, {place[1]:g})'
-            )
+            where = self._places.describe_outside(place)
+            raise WorldError(f'there is no way for "{name}" to {shown}{where}')
 
     def _find_group(self, name: str | None) -> Group:
         for group in self._groups:

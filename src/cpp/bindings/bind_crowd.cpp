@@ -54,6 +54,12 @@ Vec to_vec(const PyPoint& point) {
 
 PyPair to_pair(Vec v) { return {v.x, v.y}; }
 
+std::optional<std::tuple<double, double, double, double>> to_bounds(
+    const std::optional<crowd::Box>& box) {
+  if (!box) return std::nullopt;
+  return std::tuple(box->low.x, box->low.y, box->high.x, box->high.y);
+}
+
 std::uint32_t checked_index(std::uint32_t index, std::size_t count, const char* what) {
   if (index >= count) throw py::value_error(std::string(what) + " does not exist");
   return index;
@@ -271,7 +277,45 @@ Raises:
         return changed.reach_of(self.core(), waypoint);
       },
       py::arg("waypoint"),
-      "Returns the number of cells of the planning grid from which a way leads to a waypoint.");
+      R"(
+Returns the number of cells of the planning grid from which a way leads to a waypoint.
+
+It is 1 for a waypoint outside of the walls, to which no way is computed before it is needed.
+
+Raises:
+    PhysicsError: The grid would have too many cells.
+)");
+  crowd.def_property_readonly(
+      "region",
+      [](const CrowdHandle& self) { return to_bounds(changed_crowd(self).region(self.core())); },
+      R"(
+The part (x_min, y_min, x_max, y_max) of the world for which ways are computed [m].
+
+None for the whole world. In a world that is too large, it is that of the waypoints and the walls
+around them; without waypoints, that of the most walls that belong together.
+
+Raises:
+    PhysicsError: The grid would have too many cells.
+)");
+  crowd.def(
+      "walls_apart_from",
+      [](const CrowdHandle& self, const PyPoint& at) {
+        const Vec point = to_vec(at);
+        return to_bounds(changed_crowd(self).walls_apart_from(self.core(), {point, point}));
+      },
+      py::arg("place"), R"(
+Returns the bounds of the walls if a place is outside of them, more than 1 m away.
+
+Args:
+    place: The place [m], world frame.
+
+Returns:
+    Bounds (x_min, y_min, x_max, y_max) of the walls near the people [m], None if the place is not
+    outside or there are no walls.
+
+Raises:
+    PhysicsError: The grid would have too many cells.
+)");
   crowd.def(
       "way",
       [](const CrowdHandle& self, std::uint32_t waypoint, const PyPoint& place) {
@@ -280,7 +324,12 @@ Raises:
         return to_pair(changed.way_from(self.core(), waypoint, to_vec(place)));
       },
       py::arg("waypoint"), py::arg("place"),
-      "Returns the direction of the way from a place to a waypoint, (0, 0) if there is none.");
+      R"(
+Returns the direction of the way from a place to a waypoint, (0, 0) if there is none.
+
+Raises:
+    PhysicsError: The grid would have too many cells.
+)");
 }
 
 void bind_people(py::class_<CrowdHandle, Handle>& crowd) {
@@ -318,6 +367,7 @@ Returns:
 
 Raises:
     ValueError: A coordinate is not finite, or a body is not that of a person.
+    PhysicsError: The grid would have too many cells; nobody is sent.
 )");
   crowd.def(
       "set_key",

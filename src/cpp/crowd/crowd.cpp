@@ -5,7 +5,9 @@
 #include <utility>
 
 #include "crowd/random.h"
+#include "crowd/region.h"
 #include "world/bodies.h"
+#include "world/errors.h"
 #include "world/world.h"
 
 namespace flatland::crowd {
@@ -39,17 +41,28 @@ std::uint32_t Crowd::add_waypoint(const Waypoint& waypoint) {
 }
 
 Id Crowd::send(World& world, const std::vector<Id>& bodies, const Place& place) {
+  const auto position = [&](Id body) {
+    const Triple pose = pose_of(world, body);
+    return Vec{pose[0], pose[1]};
+  };
+  const bool is_outside = walls_apart_from(world, place).has_value();
+  for (const Id body : bodies) {
+    if (is_outside && !leads_out(position(body))) return body;
+  }
   const Crowd before = *this;
   Waypoint goal;
   goal.place = place;
   goal.is_temporary = true;
   const std::uint32_t waypoint = add_waypoint(goal);
-  for (const Id body : bodies) {
-    const Triple pose = pose_of(world, body);
-    if (square(way_from(world, waypoint, {pose[0], pose[1]})) == 0.0) {
+  try {
+    for (const Id body : bodies) {
+      if (square(way_from(world, waypoint, position(body))) > 0.0) continue;
       *this = before;
       return body;
     }
+  } catch (const PhysicsError&) {  // from `find_region`
+    *this = before;
+    throw;
   }
   for (const Id body : bodies) {
     Person* person = find(body);
@@ -138,13 +151,33 @@ bool Crowd::is_standing(const Person& person) const {
 }
 
 std::size_t Crowd::reach_of(World& world, std::uint32_t waypoint) {
-  read_surroundings(world);
+  if (walls_apart_from(world, waypoints_[waypoint].place)) return 1;
   const Way* way = way_of(waypoint);
   return way == nullptr ? 1 : way->field().reached();
 }
 
-Vec Crowd::way_from(World& world, std::uint32_t waypoint, Vec place) {
+std::optional<Box> Crowd::walls_apart_from(const World& world, const Place& place) {
   read_surroundings(world);
+  const Walls& walls = surroundings_.walls();
+  if (walls.empty()) return std::nullopt;
+  const Box box{walls.low(), walls.high(), false};
+  return box.widened(kBorder).is_apart({place.low, place.high, false}) ? std::optional(box)
+                                                                       : std::nullopt;
+}
+
+bool Crowd::leads_out(Vec p) {
+  const Walls& walls = surroundings_.walls();
+  const Box box = Box{walls.low(), walls.high(), false}.widened(kBorder);
+  if (box.is_apart({p, p, false})) return true;
+  if (way_out_ == nullptr) {
+    const FreeGrid grid(walls, box.low, box.high, settings_.cell, settings_.clearance);
+    way_out_ = std::make_shared<const FlowField>(FlowField::outwards(grid));
+  }
+  return square(way_out_->direction(p, walls)) > 0.0;
+}
+
+Vec Crowd::way_from(World& world, std::uint32_t waypoint, Vec place) {
+  if (walls_apart_from(world, waypoints_[waypoint].place) && !leads_out(place)) return {};
   const Way* way = way_of(waypoint);
   return way == nullptr ? unit(waypoints_[waypoint].place.nearest(place) - place, {1.0, 0.0})
                         : way->field().direction(place, surroundings_.walls());
@@ -182,22 +215,29 @@ std::vector<double> Crowd::state() const {
 void Crowd::read_surroundings(const World& world) {
   if (surroundings_.read(world.engine(), own_)) has_grid_ = false;
   if (has_grid_) return;
-  has_grid_ = true;
   for (auto& way : way_to_) way.reset();
-  const Walls& walls = surroundings_.walls();
   ways_.reset();
+  way_out_.reset();
+  region_.reset();
   signals_.clear();
-  if (walls.empty()) return;
-  Vec low = walls.low();
-  Vec high = walls.high();
-  for (const Waypoint& waypoint : waypoints_) {
-    low = {std::min(low.x, waypoint.place.low.x), std::min(low.y, waypoint.place.low.y)};
-    high = {std::max(high.x, waypoint.place.high.x), std::max(high.y, waypoint.place.high.y)};
+  const std::vector<Segment>& segments = surroundings_.segments();
+  if (!segments.empty()) {
+    std::vector<Box> places;
+    for (const Waypoint& waypoint : waypoints_) {
+      places.push_back({waypoint.place.low, waypoint.place.high, false});
+    }
+    const Region region = find_region(segments, places, settings_.cell);
+    region_ = region.is_partial ? std::optional(region.box) : std::nullopt;
+    // Walls beyond this distance have no effect on people in the region.
+    constexpr double kSurroundings = 20.0;  // m
+    surroundings_.restrict_to(region_ ? std::optional(region_->widened(kSurroundings))
+                                      : std::nullopt);
+    const Box area = region.box.widened(kBorder);
+    ways_ = std::make_shared<Ways>(
+        FreeGrid(surroundings_.walls(), area.low, area.high, settings_.cell, settings_.clearance),
+        surroundings_.shared_walls());
   }
-  const Vec margin{1.0, 1.0};  // m, to walk around a wall at the border
-  ways_ = std::make_shared<Ways>(
-      FreeGrid(walls, low - margin, high + margin, settings_.cell, settings_.clearance),
-      surroundings_.shared_walls());
+  has_grid_ = true;
 }
 
 void Crowd::read_people(World& world) {

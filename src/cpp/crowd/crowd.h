@@ -19,6 +19,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -73,8 +74,17 @@ class Crowd {
   std::uint32_t target_of(const Person& person) const;
   // Returns whether a person stands on purpose: stopped, waiting or in a queue.
   bool is_standing(const Person& person) const;
-  // Returns the number of cells of the grid from which there is a way to a waypoint.
+  // Returns the number of cells of the grid from which there is a way to a waypoint; 1 for a
+  // waypoint outside of the walls, to which no way is computed before it is needed.
   std::size_t reach_of(World& world, std::uint32_t waypoint);
+  // Returns the part of the world for which ways are computed, nothing for the whole world.
+  std::optional<Box> region(const World& world) {
+    read_surroundings(world);
+    return region_;
+  }
+  // Returns the bounds of the walls, nothing without walls or if the place is in this area or next
+  // to it.
+  std::optional<Box> walls_apart_from(const World& world, const Place& place);
   // Returns the direction of the way from a place to a waypoint, a zero vector if there is none.
   Vec way_from(World& world, std::uint32_t waypoint, Vec place);
   // Returns everything besides the bodies that affects the future, as numbers.
@@ -92,6 +102,8 @@ class Crowd {
   enum class Stance : std::uint8_t { kWalking, kIdle, kFixed };
 
   void read_surroundings(const World& world);
+  // Returns whether there is a way from a point to the surroundings of all walls.
+  bool leads_out(Vec p);
   void read_people(World& world);
   // Null if the person was removed.
   const Person* numbered(std::uint32_t number) const;
@@ -180,8 +192,10 @@ class Crowd {
 
   Surroundings surroundings_;
   IdSet own_;                                       // bodies and legs of all people
+  std::optional<Box> region_;                       // nothing for the whole world
   std::shared_ptr<Ways> ways_;                      // null in a world without walls
   bool has_grid_ = false;                           // whether `ways_` and `way_to_` match the walls
+  std::shared_ptr<const FlowField> way_out_;        // null if not needed yet
   std::vector<std::shared_ptr<const Way>> way_to_;  // by waypoint, null if not needed yet
   std::vector<Signal> signals_;                     // of the gates with people, by gate
   std::vector<std::uint32_t> sorted_;               // indices of people by x at the last update

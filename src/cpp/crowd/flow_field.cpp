@@ -86,6 +86,19 @@ std::int64_t floored(double number) {
   return static_cast<double>(truncated) > number ? truncated - 1 : truncated;
 }
 
+// Returns the free cells within a distance of a place without its radius: a part of the disc around
+// the place may be on the other side of a wall.
+std::vector<std::size_t> cells_at(const FreeGrid& grid, const Place& place) {
+  const double reach = 0.75 * grid.cell();
+  std::vector<std::size_t> cells;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(grid.columns() * grid.rows()); ++i) {
+    const Vec center = grid.center(i);
+    const bool is_near = length(place.nearest(center) - center) <= reach;
+    if (grid.slowness(i) > 0.0F && is_near) cells.push_back(i);
+  }
+  return cells;
+}
+
 // Returns the derivative of the arrival time on the side from which the front arrived.
 double upwind(float before, float here, float after) {
   if (std::min(before, after) >= here) return 0.0;
@@ -98,9 +111,9 @@ Vec Place::nearest(Vec p) const {
   return {std::min(std::max(p.x, low.x), high.x), std::min(std::max(p.y, low.y), high.y)};
 }
 
-FreeGrid::FreeGrid(const Walls& walls, Vec low, Vec high, double cell, double radius) : low_(low) {
+FreeGrid::FreeGrid(const Walls& walls, Vec low, Vec high, double cell, double radius)
+    : low_(low), cell_(cell) {
   const Vec size = high - low;
-  cell_ = cell_size(size, cell);
   columns_ = static_cast<std::int64_t>(size.x / cell_) + 1;
   rows_ = static_cast<std::int64_t>(size.y / cell_) + 1;
   slowness_.resize(static_cast<std::size_t>(columns_ * rows_));
@@ -118,6 +131,22 @@ Vec FreeGrid::center(std::size_t index) const {
 }
 
 FlowField::FlowField(const FreeGrid& grid, const Place& place)
+    : FlowField(grid, place, cells_at(grid, place)) {}
+
+FlowField FlowField::outwards(const FreeGrid& grid) {
+  std::vector<std::size_t> border;
+  const auto columns = static_cast<std::size_t>(grid.columns());
+  const auto count = columns * static_cast<std::size_t>(grid.rows());
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool is_inside =
+        i >= columns && i + columns < count && i % columns != 0 && (i + 1) % columns != 0;
+    if (!is_inside && grid.slowness(i) > 0.0F) border.push_back(i);
+  }
+  return {grid, Place{}, border};
+}
+
+FlowField::FlowField(const FreeGrid& grid, const Place& place,
+                     const std::vector<std::size_t>& starts)
     : low_(grid.low()),
       cell_(grid.cell()),
       columns_(grid.columns()),
@@ -125,13 +154,7 @@ FlowField::FlowField(const FreeGrid& grid, const Place& place)
       blocks_per_row_(static_cast<std::size_t>(columns_) / kBlockColumns + 1) {
   Front front(grid);
   blocks_.resize(blocks_per_row_ * (static_cast<std::size_t>(rows_) / kBlockRows + 1));
-  // The front starts only in cells within `reach` of the place, without its radius: a part of the
-  // disc around the place may be on the other side of a wall.
-  const double reach = 0.75 * cell_;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(columns_ * rows_); ++i) {
-    const Vec center = grid.center(i);
-    if (grid.slowness(i) > 0.0F && length(place.nearest(center) - center) <= reach) front.start(i);
-  }
+  for (const std::size_t cell : starts) front.start(cell);
   front.advance();
   for (std::int64_t row = 0; row < rows_; ++row) {
     for (std::int64_t column = 0; column < columns_; ++column) {

@@ -24,8 +24,7 @@ struct Place {
 // so that the fastest ways keep a distance from walls. Immutable.
 class FreeGrid {
  public:
-  // Creates cells of the size `cell` [m] for a disc of a radius [m]. The cells are larger if there
-  // would be too many of them, see `cell_size`.
+  // Creates cells of the size `cell` [m] for a disc of a radius [m].
   FreeGrid(const Walls& walls, Vec low, Vec high, double cell, double radius);
 
   // Returns the distance within which walls have an effect on a disc of a radius [m].
@@ -52,6 +51,8 @@ class FreeGrid {
 class FlowField {
  public:
   FlowField(const FreeGrid& grid, const Place& place);
+  // Returns the ways to the border of a grid.
+  static FlowField outwards(const FreeGrid& grid);
 
   // Returns the number of cells from which there is a way.
   std::size_t reached() const { return reached_; }
@@ -62,6 +63,8 @@ class FlowField {
   void prefetch(Vec p) const;
 
  private:
+  FlowField(const FreeGrid& grid, const Place& place, const std::vector<std::size_t>& starts);
+
   // A vector of the length kUnit; (0, 0) if there is no way.
   struct Direction {
     std::int8_t x = 0, y = 0;

@@ -8,7 +8,6 @@
 namespace flatland::crowd {
 
 double cell_size(Vec area, double wanted) {
-  constexpr double kMostCells = 4e6;
   return std::max(
       {wanted, std::sqrt(area.x * area.y / kMostCells), std::max(area.x, area.y) / kMostCells});
 }
@@ -37,11 +36,26 @@ SegmentGrid::SegmentGrid(const std::vector<Segment>& segments, double cell, doub
   const double reach_of_center = reach_of_cell + 0.5 * std::sqrt(2.0) * cell_;
   for (std::uint32_t i = 0; i < segments.size(); ++i) {
     const Segment& s = segments[i];
-    const std::int64_t first_column = column_of(std::min(s.a.x, s.b.x) - reach_of_cell);
-    const std::int64_t last_column = column_of(std::max(s.a.x, s.b.x) + reach_of_cell);
+    const double first_x = std::min(s.a.x, s.b.x);
+    const double last_x = std::max(s.a.x, s.b.x);
+    const double slope = (s.b.x - s.a.x) / (s.b.y - s.a.y);
     const std::int64_t last_row = row_of(std::max(s.a.y, s.b.y) + reach_of_cell);
     for (std::int64_t row = row_of(std::min(s.a.y, s.b.y) - reach_of_cell); row <= last_row;
          ++row) {
+      // The part of the segment that is near this row; a horizontal segment is near as a whole.
+      double begin = first_x;
+      double end = last_x;
+      if (s.a.y != s.b.y) {
+        const double y = low_.y + (static_cast<double>(row) + 0.5) * cell_ - s.a.y;
+        const double x1 = s.a.x + slope * (y - reach_of_center);
+        const double x2 = s.a.x + slope * (y + reach_of_center);
+        begin = std::max(begin, std::min(x1, x2) - kRounding);
+        end = std::min(end, std::max(x1, x2) + kRounding);
+      }
+      const std::int64_t first_column =
+          column_of(std::max(begin - reach_of_center, first_x - reach_of_cell));
+      const std::int64_t last_column =
+          column_of(std::min(end + reach_of_center, last_x + reach_of_cell));
       for (std::int64_t column = first_column; column <= last_column; ++column) {
         const Vec corner =
             low_ + cell_ * Vec{static_cast<double>(column), static_cast<double>(row)};

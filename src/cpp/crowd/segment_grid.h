@@ -26,8 +26,11 @@ inline Vec nearest_on(const Segment& segment, Vec p) {
   return segment.a + std::min(1.0, positive) * along;
 }
 
+// The greatest number of cells of a grid.
+inline constexpr double kMostCells = 4e6;
+
 // Returns the size of the cells of a grid over an area: the wanted size, or a greater size if there
-// would be more than four million cells.
+// would be too many cells.
 double cell_size(Vec area, double wanted);
 
 // Returns the index of the cell at a coordinate in cells, or of the nearest one of `count` cells.

@@ -92,8 +92,16 @@ bool Surroundings::read(const b2World& engine, const IdSet& own) {
     add_segments(*body, segments);
     keys_.push_back(key_of(*body));
   }
+  all_.reset();
   walls_ = std::make_shared<const Walls>(std::move(segments), walls_->reach());
   return true;
+}
+
+void Surroundings::restrict_to(const std::optional<Box>& box) {
+  if (!box && all_ == nullptr) return;
+  if (all_ == nullptr) all_ = std::make_shared<const std::vector<Segment>>(walls_->segments());
+  walls_ = std::make_shared<const Walls>(box ? clipped(*all_, *box) : *all_, walls_->reach());
+  if (!box) all_.reset();
 }
 
 void Surroundings::extend(double reach) {

@@ -7,9 +7,11 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <unordered_set>
 #include <vector>
 
+#include "crowd/region.h"
 #include "crowd/walls.h"
 #include "vec.h"
 #include "world/slot_map.h"
@@ -39,10 +41,14 @@ class Surroundings {
 
   // Reads all bodies except `own`. Returns whether the walls have changed.
   bool read(const b2World& engine, const IdSet& own);
+  // Ignores the walls outside of a box, or no walls without a box.
+  void restrict_to(const std::optional<Box>& box);
   // Allows queries of the walls up to a range.
   void extend(double reach);
 
   const Walls& walls() const { return *walls_; }
+  // All walls, also those that are ignored.
+  const std::vector<Segment>& segments() const { return all_ ? *all_ : walls_->segments(); }
   std::shared_ptr<const Walls> shared_walls() const { return walls_; }
   const std::vector<Obstacle>& obstacles() const { return obstacles_; }
 
@@ -61,8 +67,9 @@ class Surroundings {
   void add_obstacles(const b2Body& body);
 
   std::uint16_t bits_;
-  std::vector<Key> keys_;             // of the bodies of the walls
-  std::vector<const b2Body*> fixed_;  // valid within `read`
+  std::vector<Key> keys_;                            // of the bodies of the walls
+  std::vector<const b2Body*> fixed_;                 // valid within `read`
+  std::shared_ptr<const std::vector<Segment>> all_;  // null if no walls are ignored
   std::shared_ptr<const Walls> walls_ = std::make_shared<const Walls>(std::vector<Segment>{}, 0.0);
   std::vector<Obstacle> obstacles_;
 };
