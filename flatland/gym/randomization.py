@@ -178,7 +178,10 @@ class _ScanPart(Randomization):
 
 
 class ScanNoise(_ScanPart):
-    """Normal noise of all ranges, in addition to that of the laser; not of beams without a hit."""
+    """Normal noise of all ranges, in addition to that of the laser; not of beams without a hit.
+
+    Ranges remain from 0 to the range of the laser.
+    """
 
     def __init__(self, deviation: Interval = (0.0, 0.03)) -> None:
         """Creates the part.
@@ -198,7 +201,7 @@ class ScanNoise(_ScanPart):
             noise = self._generators[row].standard_normal(len(ranges), np.float32)
             noise *= np.float32(self._strengths[row])
             is_hit = ranges < situation.max_range
-            ranges[is_hit] = np.maximum(ranges[is_hit] + noise[is_hit], 0.0)
+            ranges[is_hit] = np.clip(ranges[is_hit] + noise[is_hit], 0.0, situation.max_range)
 
 
 class _Dropout(_ScanPart):

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 MAX_BEAMS = 1_000_000
 _FEW_BEAMS = 3  # which may have any angles
 _WIDE = 0.5  # rad between beams, 29 degrees
+OUT_OF_RANGE = ("keep", "clamp", "drop")
 MAX_RANGE = 1e6  # m; the spacing of single-precision numbers is 6 cm there
 
 
@@ -161,6 +162,15 @@ def read_no_hit(config: YamlReader, length: float, default: str = "nan") -> floa
     """
     values = {"nan": math.nan, "inf": math.inf, "range": length}
     return values[read_choice(config, "no_hit", list(values), default)]
+
+
+def read_out_of_range(config: YamlReader) -> str:
+    """Reads what becomes of a hit that noise moves out of the limits of the sensor.
+
+    Raises:
+        YamlError: The value is not one of the names.
+    """
+    return read_choice(config, "out_of_range", OUT_OF_RANGE)
 
 
 def read_layers(config: YamlReader, world: PluginWorld) -> int:

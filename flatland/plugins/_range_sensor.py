@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from flatland.plugin_api.parameters import read_body, read_phase, read_rate
 from flatland.plugin_api.plugin import ModelPlugin
-from flatland.plugins._beams import read_range, read_range_min
+from flatland.plugins._beams import read_out_of_range, read_range, read_range_min
 from flatland.plugins._range_noise import read_range_noise
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ class RangeSensor(ModelPlugin):
         self._rate = read_rate(config)
         self._phase = read_phase(config, self._rate)
         noise = read_range_noise(config, self.range)
+        self._out_of_range = read_out_of_range(config)
         self._noise = self.noise_stream(stream)
         self.sends_transform: bool = config.get("broadcast_tf", "bool", True)
         self._body_frame_id = self.model.frame(self.body.name)

@@ -86,6 +86,7 @@ class Laser(RangeSensor):
             range_min=self.range_min,
             no_hit=no_hit,
             noise=noise,
+            out_of_range=self._out_of_range,
         )
         output = self.output(config.get("topic", "string", "scan"), LaserScan)
         self._update = self._start(output, cast_scans)

@@ -49,6 +49,7 @@ class SemanticScan(RangeSensor):
             range_min=self.range_min,
             no_hit=read_no_hit(config, self.range),
             noise=noise,
+            out_of_range=self._out_of_range,
         )
         topic = config.get("topic", "string", "semantic_scan")
         self._start(self.output(topic, values.SemanticScan))

@@ -54,6 +54,7 @@ class Sonar(RangeSensor):
             range_min=self.range_min,
             no_hit=read_no_hit(config, self.range, "inf"),
             noise=noise,
+            out_of_range=self._out_of_range,
             uses_materials=self.radiation_type == "infrared",
             is_cone=True,
         )

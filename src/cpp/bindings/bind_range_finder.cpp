@@ -42,19 +42,25 @@ std::shared_ptr<BeamFan> make_fan(const Ends& ends) {
 RangeFinder make_finder(const std::variant<std::shared_ptr<BeamFan>, Ends>& beams, double length,
                         const PyPose& origin, std::int64_t mask, std::int64_t reflect_mask,
                         double range_min, double no_hit, std::optional<RangeNoise> noise,
-                        bool uses_materials, bool is_cone) {
+                        const std::string& out_of_range, bool uses_materials, bool is_cone) {
   const auto* shared = std::get_if<std::shared_ptr<BeamFan>>(&beams);
   const auto fan = shared == nullptr ? make_fan(std::get<Ends>(beams)) : *shared;
   if (fan == nullptr) throw py::type_error("a range finder requires beams, got None");
   checked_vector(origin[0], origin[1], "origin");
   checked_finite(origin[2], "origin angle");
+  using OutOfRange = RangeLimits::OutOfRange;
   const RangeFinder::Parameters parameters{
       origin,
       checked_not_negative(length, "length"),
       checked_bits(mask, "mask"),
       checked_bits(reflect_mask, "reflect_mask"),
       {checked_not_negative(range_min, "range_min"),
-       std::isfinite(no_hit) ? checked_finite(no_hit, "no_hit") : static_cast<float>(no_hit)},
+       std::isfinite(no_hit) ? checked_finite(no_hit, "no_hit") : static_cast<float>(no_hit),
+       checked_not_negative(length, "length"),
+       chosen<OutOfRange>(out_of_range, "out_of_range",
+                          {{"keep", OutOfRange::kKeep},
+                           {"clamp", OutOfRange::kClamp},
+                           {"drop", OutOfRange::kDrop}})},
       std::move(noise),
       uses_materials,
       is_cone};
@@ -274,8 +280,8 @@ number of the update. They depend neither on other scans nor on the number of th
   finder.def(py::init(&make_finder), py::arg("beams"), py::arg("length"), py::kw_only(),
              py::arg("origin"), py::arg("mask"), py::arg("reflect_mask") = 0,
              py::arg("range_min") = 0.0, py::arg("no_hit") = std::nan(""),
-             py::arg("noise") = py::none(), py::arg("uses_materials") = true,
-             py::arg("is_cone") = false, R"(
+             py::arg("noise") = py::none(), py::arg("out_of_range") = "keep",
+             py::arg("uses_materials") = true, py::arg("is_cone") = false, R"(
 Creates a range finder.
 
 Args:
@@ -289,6 +295,9 @@ Args:
         ranges negative.
     no_hit: Range that is reported for a beam without a hit [m].
     noise: Noise model; None for exact ranges.
+    out_of_range: What becomes of a hit whose range is below `range_min` or above `length` because
+        of normal noise: `keep`, `clamp` to these limits, or `drop`, which reports -inf and `no_hit`
+        instead.
     uses_materials: Whether materials let beams pass and reflect them; otherwise each fixture stops
         all beams.
     is_cone: Whether there is a single reading, that of the nearest hit of all beams.

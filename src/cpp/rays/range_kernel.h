@@ -8,10 +8,28 @@ struct Limits {
   using Floats = Lanes::Floats;
 
   Floats shortest, no_hit;
+  bool is_bounded;
+  Floats least, most, below, above;  // bounds of readings with noise, and what replaces others
 
   explicit FLATLAND_INLINE Limits(const RangeLimits& limits)
       : shortest(Lanes::broadcast(limits.range_min > 0.0F ? limits.range_min : -kInfinity)),
-        no_hit(Lanes::broadcast(limits.no_hit)) {}
+        no_hit(Lanes::broadcast(limits.no_hit)),
+        is_bounded(limits.out_of_range != RangeLimits::OutOfRange::kKeep),
+        least(Lanes::broadcast(limits.range_min)),
+        most(Lanes::broadcast(limits.range_max)),
+        below(drops(limits) ? Lanes::broadcast(-kInfinity) : least),
+        above(drops(limits) ? Lanes::broadcast(kNaN) : most) {}
+
+  static bool drops(const RangeLimits& limits) {
+    return limits.out_of_range == RangeLimits::OutOfRange::kDrop;
+  }
+
+  // Bounds readings with noise. Hits that are too close without noise are not raised.
+  FLATLAND_INLINE Floats bound(Floats exact, Floats range) const {
+    const Floats raised = Lanes::select(Lanes::less(exact, least), range, below);
+    const Floats lowered = Lanes::select(Lanes::less(most, range), above, range);
+    return Lanes::select(Lanes::less(range, least), raised, lowered);
+  }
 
   FLATLAND_INLINE Floats apply(Floats range) const {
     const Floats low = Lanes::broadcast(-kInfinity);
@@ -64,7 +82,9 @@ void add_normal_noise(float* ranges, std::size_t count, const NoiseKey& key, flo
     const Floats range = Lanes::load(ranges + i);
     Floats noise = normal * deviation;
     if (is_proportional) noise = noise * range;
-    Lanes::store(ranges + i, kept.apply(range + noise));
+    Floats noisy = range + noise;
+    if (kept.is_bounded) noisy = kept.bound(range, noisy);
+    Lanes::store(ranges + i, kept.apply(noisy));
   };
   for (std::size_t group = 0; group < count; group += kBeamsPerGroup) {
     const auto first_counter = static_cast<std::uint32_t>(group / 4);

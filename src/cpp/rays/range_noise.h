@@ -17,8 +17,14 @@ struct NoiseKey {
 // The limits of readings: a reading below `range_min` [m] becomes -inf, a miss becomes `no_hit`. If
 // `range_min` is 0, readings are not limited, even if noise makes them negative.
 struct RangeLimits {
+  // What becomes of readings of hits that normal noise makes too short or too long: they are kept,
+  // become the limit, or become those of a hit that is too close (-inf) and of a miss.
+  enum class OutOfRange { kKeep, kClamp, kDrop };
+
   float range_min;
   float no_hit;
+  float range_max = std::numeric_limits<float>::infinity();
+  OutOfRange out_of_range = OutOfRange::kKeep;
 };
 
 // A noise model, immutable.

@@ -269,6 +269,7 @@ RANGE_SENSOR = (
     RATE,
     Key("broadcast_tf", "true", "bool"),
     Key("noise_std_dev", "0", "float", limit=">= 0"),
+    Key("out_of_range", "drop", "string"),
     Key("layers", "[2d]", "names"),
     AFTER_STEP,
 )

@@ -153,6 +153,12 @@ def test_noise_has_the_deviation(make: Make, pusher: Path) -> None:
     np.testing.assert_array_equal(noisy[:, ~is_hit], np.tile(exact[~is_hit], (201, 1)))
 
 
+def test_noise_remains_within_the_range(make: Make, pusher: Path) -> None:
+    noisy = scans(make, pusher, ScanNoise((3.0, 3.0)), 20)
+    hits = noisy[~np.isnan(noisy)]
+    assert (hits.min(), hits.max()) == (0.0, 4.0)
+
+
 def test_the_share_of_beams_is_lost(make: Make, pusher: Path) -> None:
     exact = scans(make, pusher, Randomization(), 0)[0]
     rows = scans(make, pusher, BeamDropout((0.3, 0.3)), 300)

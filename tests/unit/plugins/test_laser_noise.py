@@ -202,3 +202,50 @@ def test_scans_do_not_depend_on_when_a_subscriber_connects(eye: Eye, model: str)
 def test_shares_may_differ_from_1_by_rounding(eye: Eye) -> None:
     ranges = eye.ranges("noise_model: beam, z_hit: 0.3333333, z_max: 0.3333333, z_rand: 0.3333333")
     assert np.isnan(ranges).mean() == pytest.approx(1 / 3, abs=0.01)
+
+
+@pytest.mark.parametrize("model", ["additive", "proportional"])
+@pytest.mark.parametrize("shortest", [0.0, 1.5])
+def test_noise_beyond_the_limits_is_kept_clamped_or_dropped(
+    eye: Eye, model: str, shortest: float
+) -> None:
+    deviation = 8.0 if model == "additive" else 1.0
+    options = f"noise_model: {model}, noise_std_dev: {deviation}, no_hit: inf"
+    kept = eye.ranges(options)
+    limits = f"{options}, range_min: {shortest}, out_of_range:"
+    assert kept.min() < 0
+    assert model == "proportional" or kept.max() > RANGE
+    np.testing.assert_array_equal(eye.ranges(f"{options}, out_of_range: keep"), kept)
+    np.testing.assert_array_equal(eye.ranges(f"{limits} clamp"), np.clip(kept, shortest, RANGE))
+    dropped = np.where(kept > RANGE, np.inf, np.where(kept < shortest, -np.inf, kept))
+    np.testing.assert_array_equal(eye.ranges(f"{limits} drop"), dropped)
+
+
+def test_a_hit_that_is_too_close_is_not_raised_to_the_limit(eye: Eye) -> None:
+    options = "noise_std_dev: 0.5, range_min: 7"
+    kept = eye.ranges(options)
+    assert np.isneginf(kept).any()
+    for choice in ("clamp", "drop"):
+        np.testing.assert_array_equal(eye.ranges(f"{options}, out_of_range: {choice}"), kept)
+
+
+@pytest.mark.parametrize("kind", ["Sonar", "SemanticScan"])
+def test_other_range_sensors_have_the_limits_as_well(plugin_world: Any, kind: str) -> None:
+    more = "field_of_view: 0" if kind == "Sonar" else "angle: {min: 0, max: 0.1, increment: 0.01}"
+    files = plugin_world.files
+    files.write("wall.dat", "1 -9 1 9")
+    files.write("wall.yaml", "{type: line_segments, data: wall.dat, scale: 1, origin: [0, 0, 0]}")
+    world = plugin_world(
+        f"- {{type: {kind}, name: eye, body: base, range: 2, noise_std_dev: 3, {more}, "
+        "out_of_range: clamp, topic: out, layers: [walls]}",
+        layers="[{name: walls, map: wall.yaml}, {name: other}]",
+        seed=1,
+    )
+    output = world.output("/out")
+    ranges: list[float] = []
+    for _ in range(40):
+        world.step()
+        ranges += np.ravel(
+            output.latest.range if kind == "Sonar" else output.latest.ranges
+        ).tolist()
+    assert {min(ranges), max(ranges)} == {0.0, 2.0}
