@@ -131,9 +131,8 @@ def test_refused_spawns_have_a_reason_and_no_effect(ros: Any) -> None:
 def test_unknown_model_is_neither_deleted_nor_moved(ros: Any) -> None:
     for verb, answer in (("delete", ros.delete("ghost")), ("move", ros.move("ghost", (0, 0, 0)))):
         assert answer.success is False
-        assert answer.message.startswith(
-            f'Flatland World: failed to {verb} model, model with name "ghost" does not exist (hint: '
-        )
+        text = f'Flatland World: failed to {verb} model, model with name "ghost" does not exist'
+        assert answer.message.startswith(f"{text} (hint: ")
 
 
 def test_name_of_a_model_may_be_any_text(ros: Any) -> None:
