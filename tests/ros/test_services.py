@@ -135,14 +135,22 @@ def test_unknown_model_is_neither_deleted_nor_moved(ros: Any) -> None:
         assert answer.message.startswith(f"{text} (hint: ")
 
 
-def test_name_of_a_model_may_be_any_text(ros: Any) -> None:
-    for name in ("a b", "ä☃", "new\nline", "/", "~", "$(x)", "a\0b", "n" * 9999):
+def test_name_of_a_model_need_not_be_a_legal_ros_name(ros: Any) -> None:
+    for name in ("a b", "ä☃", "/", "~", "$(x)", "n" * 255):
         assert ros.spawn("ball.model.yaml", name).success
         assert "already exists" in ros.spawn("ball.model.yaml", name).message
         assert ros.move(name, (1, 1, 0)).success
         assert states(ros, name).name == [name]
         assert ros.delete(name).success
         assert not ros.delete(name).success
+
+
+def test_a_name_with_control_characters_or_of_absurd_length_is_refused(ros: Any) -> None:
+    for name in ("new\nline", "a\0b", "a/../b", "n" * 9999):
+        response = ros.spawn("ball.model.yaml", name)
+        assert not response.success
+        assert "its name must have at most 255 characters" in response.message
+        assert not states(ros).name
 
 
 @pytest.mark.parametrize(

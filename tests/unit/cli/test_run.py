@@ -162,7 +162,7 @@ class TestBag:
     def test_a_folder_that_does_not_exist(self, robot_world, capsys, name):
         option = "--bag" if name.endswith("bag") else "--video"
         assert main("run", robot_world, "--duration", "1", option, name) == 1
-        assert "No such file or directory" in capsys.readouterr().err
+        assert f"cannot write {name}: there is no folder no\n" in capsys.readouterr().err
 
     @pytest.mark.parametrize(
         ("arguments", "message"),

@@ -125,7 +125,7 @@ def test_the_oldest_message_is_dropped_but_never_a_part_of_one(setup: Setup) -> 
     assert outbox.dropped == 2
 
 
-def test_a_broken_connection_is_reported_by_a_write_and_closed_by_the_flusher() -> None:
+def test_a_broken_connection_is_reported_by_a_write() -> None:
     connection, reader = socket.socketpair()
     with connection:
         setup = Setup(connection)
@@ -133,6 +133,18 @@ def test_a_broken_connection_is_reported_by_a_write_and_closed_by_the_flusher() 
         with pytest.raises(TransportTerminated, match="Broken pipe"):
             setup.write(b"aa")
         assert not setup.transport.done  # rospy closes it
+
+
+def test_a_broken_connection_with_waiting_messages_is_closed_by_the_flusher(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    connection, reader = socket.socketpair()
+    with connection:
+        setup = Setup(connection)
+        monkeypatch.setattr(module, "_flusher", lambda: setup)
+        while not setup.watched:  # until the buffer of the socket is full
+            setup.write(b"a" * 65536)
+        reader.close()
         setup.outbox.flush()
         assert setup.transport.done
         with pytest.raises(TransportTerminated, match="connection closed"):
