@@ -72,7 +72,8 @@ b2PolygonShape make_polygon(const std::vector<b2Vec2>& points) {
   const std::vector<b2Vec2> corners = exact_hull(points);
   const std::vector<b2Vec2> distinct = weld_points(points);
   const std::vector<b2Vec2> hull = box2d_hull(distinct);
-  if (has_area(corners.data(), corners.size()) && !has_corners(hull, corners)) return polygon_of(corners);
+  if (has_area(corners.data(), corners.size()) && !has_corners(hull, corners))
+    return polygon_of(corners);
   if (distinct.size() < 3) {
     throw std::invalid_argument(
         "a polygon must have at least 3 points that are at least 2.5 mm apart, got " +
