@@ -109,7 +109,8 @@ nitpick_ignore_regex = [
     # Names that are imported only for type checkers, or are not described.
     (
         r"py:class",
-        r"(Episodes|FleetEnv|Laser|Outline|Path|PluginWorld|ReadYaml|Rows?|Touches|Update)",
+        r"(Drawn|Episodes|FleetEnv|Laser|Line|Outline|Path|PluginWorld|ReadYaml|Rows?|Touches|"
+        r"Update)",
     ),
     (r"py:class", r"flatland\.(plugin_api\.ports\.CommandSource|timekeeper\.SimulatedTime)"),
     (r"py:exc", "MissingPackageError"),
