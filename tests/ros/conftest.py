@@ -179,11 +179,11 @@ class Ros:
             for kind, entries in zip(kinds, state, strict=True)
         }
 
-    def connected_topics(self, node: str = "/flatland_server") -> set[str]:
-        """Returns the topics of a node that have a connection."""
+    def connected_topics(self, node: str = "/flatland_server", of: str = "") -> set[str]:
+        """Returns the topics of a node that nodes whose names start with `of` have joined."""
         api = ServerProxy(self.master.lookupNode(node))
         _, _, connections = api.getBusInfo("/flatland_tests")
-        return {topic for _, _, _, _, topic, *_ in connections}
+        return {topic for _, other, _, _, topic, *_ in connections if other.startswith(of)}
 
     def types(self) -> dict[str, str]:
         """Returns the message type of each topic."""

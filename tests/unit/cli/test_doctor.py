@@ -104,6 +104,7 @@ def test_a_module_that_does_not_fit_numpy_names_the_cause(tmp_path, monkeypatch)
     (tmp_path / "cv2.py").write_text("raise AttributeError('_ARRAY_API not found')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "cv2", raising=False)
     monkeypatch.setattr("importlib.metadata.version", lambda _name: "2.4.6")
     (found,) = doctor._check_modules("tools", [("cv2", "OpenCV", "apt-get install x", "videos")])
     assert found.detail.startswith(
