@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -55,7 +56,7 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yields a temporary path with the same suffix; its file becomes `path` at the end.
 
     On an error, the temporary file is removed, and an existing file is kept. A device or pipe is
-    written directly.
+    written directly. If several processes write one file, it is that of the last one to finish.
 
     Args:
         path: The file; the file that a symbolic link refers to.
@@ -68,7 +69,8 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
         with named_errors(path):
             yield target
         return
-    part = target.with_name(f"{target.stem}.part{target.suffix}")
+    # Another process may be writing the same file.
+    part = target.with_name(f"{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
     try:
         with named_errors(path, part):
             yield part

@@ -28,6 +28,7 @@ from flatland.cli.outputs import Recordings, path_with, recording_arguments
 from flatland.cli.progress import StopSignals, progress_bar
 from flatland.drawing import VIDEO_FORMATS, FrameRenderer, VideoFile, check_matplotlib, check_opencv
 from flatland.errors import FlatlandError
+from flatland.foreign_texts import text_of
 from flatland.output_files import check_outputs, replaced
 from flatland.runtime.plain_commands import set_command
 from flatland.world import World
@@ -164,7 +165,7 @@ def _simulate(world: World, duration: float, video: _Video | None, stop: StopSig
                 raise
             except Exception as error:
                 raise FlatlandError(
-                    f"stopped at {world.time:.12g} s: {type(error).__name__}: {error}"
+                    f"stopped at {world.time:.12g} s: {type(error).__name__}: {text_of(error)}"
                 ) from error
             now = time.perf_counter()
             if steps == chunk:

@@ -11,13 +11,13 @@ from flatland.cli.arguments import Commands, add_command, add_param, count, posi
 from flatland.cli.check import check_scenarios
 from flatland.cli.contents import counted
 from flatland.cli.progress import StopSignals, counting_bar
+from flatland.foreign_texts import clean_name
 from flatland.output_files import check_outputs
 from flatland.scenarios.cluster import Cluster
 from flatland.scenarios.columns import FAULTS
 from flatland.scenarios.comparison import Change, Comparison, compare
 from flatland.scenarios.controllers import INCLUDED, POLICY, split_names
 from flatland.scenarios.episode import Options, Result
-from flatland.scenarios.foreign import clean_name
 from flatland.scenarios.junit import write_junit
 from flatland.scenarios.report import Report, worst_first, write_report
 from flatland.scenarios.results import SuiteResults, locked, read_results, write_results

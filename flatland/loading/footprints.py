@@ -15,10 +15,11 @@ _LEAST_DEPTH: Final = 0.0025  # m
 _LEAST_SHARE: Final = 0.01  # of the extent, for small polygons
 
 
-def hull_problem(points: Sequence[Vector2], outer: DoubleArray) -> str:
+def hull_problem(body: str, points: Sequence[Vector2], outer: DoubleArray) -> str:
     """Returns what the physics makes of a polygon that is not convex.
 
     Args:
+        body: Name of the body.
         points: Corners in the order in which they are joined [m].
         outer: Counter-clockwise corners of the convex hull [m], shape (n, 2).
 
@@ -31,12 +32,13 @@ def hull_problem(points: Sequence[Vector2], outer: DoubleArray) -> str:
     perimeter = float(np.hypot(*_sides(outer).T).sum())
     if hull_area - area > tolerance * perimeter and _crosses_itself(polygon):
         return (
-            "a polygon that crosses itself; the physics uses its convex hull, with an area of "
-            f"{hull_area:.4g} m²: list the corners in the order of the outline"
+            f'a polygon of body "{body}" that crosses itself; the physics uses its convex '
+            f"hull, with an area of {hull_area:.4g} m²: list the corners in the order of the "
+            "outline"
         )
     if _depth(polygon, outer) > tolerance:
         return (
-            "concave; the physics uses the convex hull, with an area of "
+            f'concave in body "{body}"; the physics uses the convex hull, with an area of '
             f"{hull_area:.4g} m² instead of {area:.4g} m²: use several convex footprints"
         )
     return ""

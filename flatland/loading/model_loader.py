@@ -212,7 +212,7 @@ class ModelLoader:
             points = reader.get_list("points", "vector", min_size=3, max_size=8, finite=True)
             reader.ensure_accessed_all()
             fixture = _create(reader, body.create_polygon, points, **properties)
-            reader.warn("points", lambda: hull_problem(points, fixture.vertices))
+            reader.warn("points", lambda: hull_problem(body.name, points, fixture.vertices))
         if material is not None:
             fixture.material = material
 

@@ -36,6 +36,7 @@ _LOG = logging.getLogger("flatland")
 TOPIC_SCHEME = "topic://"
 """Begin of the map of a layer that is received from a topic."""
 _MIN_KEPT = 0.99  # share of the length of all walls, below which a warning is logged
+_MAX_ROUNDING = 0.002  # m, of coordinates: less than the tolerance of collisions, 0.005 m
 MAX_MAGNITUDE = 1e9
 """Largest absolute value of a coordinate [m] or an angle [rad] of the physics."""
 _PROGRESS_PERIOD: Final = 5.0  # s between two messages about the models that are loaded
@@ -263,6 +264,8 @@ def _load_layer(world: LoadedWorld, reader: YamlReader) -> None:
             ) from error
     if layer_map is not None and layer_map.path:
         _warn_about_short_edges(world.source, layer, layer_map)
+    if layer_map is not None:
+        _warn_about_far_walls(world.source, layer, layer_map)
     world.add_layer(layer)
 
 
@@ -280,6 +283,24 @@ def _warn_about_short_edges(source: WorldSource, layer: Layer, layer_map: LayerM
             layer.name,
             len(layer_map.edges) - len(layer.edges),
             len(layer_map.edges),
+        )
+
+
+def _warn_about_far_walls(source: WorldSource, layer: Layer, layer_map: LayerMap) -> None:
+    """Logs if coordinates are so large that they are rounded by a length that matters."""
+    x, y, _ = layer_map.origin
+    farthest = max(abs(x), abs(y), float(np.abs(layer.edges).max(initial=0.0)))
+    step = float(np.spacing(np.float32(farthest)))
+    if step > _MAX_ROUNDING:
+        source.inputs.warn(
+            Place(layer_map.path),
+            'Layer "%s": coordinates of %.9g m are rounded to multiples of %.3g m, since the '
+            "physics computes in single precision, so that walls and robots are displaced",
+            layer.name,
+            farthest,
+            step,
+            hint="subtract a common offset, such as that of a UTM zone, from the origins of all "
+            "maps and the poses of all models, so that they are near (0, 0)",
         )
 
 

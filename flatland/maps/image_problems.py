@@ -14,6 +14,7 @@ from flatland.maps.grey_image import GreyImage, ImageContent
 from flatland.maps.map_image import lowest_on
 
 _USUAL: Final = 0.65  # `occupied_thresh`
+_LEAST_BRIGHT: Final = 64  # of the brightest pixel of an image that uses its range
 
 
 def threshold_problem(image: ImageContent, occupied_thresh: float) -> str:
@@ -54,7 +55,7 @@ def image_problem(image: ImageContent, occupied_thresh: float) -> str:
     low, high = int(image.grey.min()), int(image.grey.max())
     cause = _alpha_cause(image, lowest)
     if low < lowest <= high:
-        return cause
+        return cause or _dark_cause(image, low, high, lowest)
     if high < lowest:
         found = f"none of the {count} pixels is free, so that the layer is a solid block"
     else:
@@ -88,6 +89,21 @@ def _blended(grey: GreyImage, alpha: GreyImage, background: int) -> GreyImage:
     opacity = alpha.astype(np.uint16)
     mixed = grey * opacity + np.uint16(background) * (255 - opacity)
     return (mixed // 255).astype(np.uint8)
+
+
+def _dark_cause(image: ImageContent, low: int, high: int, lowest: int) -> str:
+    """Returns that even free pixels are dark, empty if they are not."""
+    if high >= _LEAST_BRIGHT:
+        return ""
+    values = f"from {low} to {high} of 255"
+    if image.peak is not None:
+        values = f"at most {image.peak} of {image.scale}"
+    free = np.count_nonzero(image.grey >= lowest)
+    return (
+        f"its values are {values}, only a low part of their range, and {free} of "
+        f"{image.grey.size} pixels are free; scale the values to the whole range, with an "
+        f'"occupied_thresh" of {_USUAL:g}'
+    )
 
 
 def _range_cause(image: ImageContent, low: int, high: int, occupied_thresh: float) -> str:

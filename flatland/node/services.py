@@ -14,6 +14,7 @@ from typing import Any, Final, TypeVar
 
 from flatland.config.inputs import FileStore
 from flatland.errors import BatchError, FlatlandError
+from flatland.foreign_texts import text_of
 from flatland.geometry import Pose
 from flatland.loading.model_source import ModelSpec
 from flatland.loading.world_source import WorldSource
@@ -172,7 +173,7 @@ class Services:
             raise CallError(error.text_with_hint, index) from error
         except Exception as error:
             _LOG.exception("unexpected internal error in a service call")
-            raise CallError(f"{type(error).__name__}: {error}") from error
+            raise CallError(f"{type(error).__name__}: {text_of(error)}") from error
         finally:
             self._transport.flush(REGISTRATION_TIMEOUT)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flatland.errors import WorldError
+from flatland.foreign_texts import text_of
 from flatland.plugin_api.ports import Command
 from flatland.recording.log_file import FORMAT, LogWriter, Record, RecordingWriteError, encode_value
 from flatland.runtime.observer import WorldObserver
@@ -120,7 +121,7 @@ class Recorder(WorldObserver):
             raise
         finally:
             self._depth -= 1
-            text = None if error is None else f"{type(error).__name__}: {error}"
+            text = None if error is None else f"{type(error).__name__}: {text_of(error)}"
             self._write("result", error=text, **self._new_inputs())
 
     @contextmanager

@@ -11,6 +11,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from flatland.errors import FlatlandError
+from flatland.foreign_texts import text_of
 from flatland.node.names import sendable_text
 from flatland.node.transport import CallError
 from flatland.ros2 import convert
@@ -140,7 +141,7 @@ class _SharedService(Shared):
             text = str(error)
         except Exception as error:
             _LOG.exception("service %s raised", self.key[1])
-            text = sendable_text(f"{type(error).__name__}: {error}")
+            text = sendable_text(f"{type(error).__name__}: {text_of(error)}")
         if hasattr(response, "message"):
             response.message = text
         else:

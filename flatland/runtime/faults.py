@@ -11,6 +11,7 @@ from collections.abc import Callable, Hashable
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, get_args
 
 from flatland.errors import PluginError
+from flatland.foreign_texts import text_of
 from flatland.plugin_api.ports import callback_name
 
 if TYPE_CHECKING:
@@ -147,7 +148,7 @@ def _raisable(what: str, error: BaseException) -> BaseException:
     """Returns the exception to raise, which names its source."""
     if isinstance(error, SystemExit):
         # A plugin must not end the program.
-        fault = PluginError(f"{what} raised SystemExit({error.code!r})")
+        fault = PluginError(f"{what} raised SystemExit({text_of(error.code, repr)})")
         fault.__cause__ = error
         return fault
     error.add_note(f"raised by {what}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import logging
 import math
 from collections.abc import Callable
 from typing import Final
@@ -14,11 +15,13 @@ from flatland.errors import WorldError
 from flatland.geometry import BoolArray, Bounds, DoubleArray
 from flatland.physics import are_connected, connected_regions, distances_to_off
 
+_LOG = logging.getLogger("flatland")
+
 IntArray = npt.NDArray[np.int64]
 
 _CELLS_PER_RADIUS: Final = 4.0
 _MIN_CELL_SIZE: Final = 0.02  # m
-_MAX_CELL_SIZE: Final = 0.05  # m, exceeded only to limit the number of cells
+_MAX_CELL_SIZE: Final = 0.05  # m, exceeded only to limit the number of cells, with a warning
 _MAX_CELLS: Final = 16_000_000
 _OUTSIDE: Final = -1  # number of the region around the rectangle
 
@@ -56,12 +59,14 @@ class FreeSpace:
         width, height = x_max - x_min, y_max - y_min
         self._radius = radius
         self._fits = fits
-        if cell is None:
-            cell = min(max(radius / _CELLS_PER_RADIUS, _MIN_CELL_SIZE), _MAX_CELL_SIZE)
-        self._cell = max(cell, _limit_of_cells(width, height))
         self._x, self._y = float(x_min), float(y_min)
         self._origin = np.array([x_min, y_min])
         self._extent = np.array([width, height])
+        if cell is None:
+            cell = min(max(radius / _CELLS_PER_RADIUS, _MIN_CELL_SIZE), _MAX_CELL_SIZE)
+        self._cell = max(cell, _limit_of_cells(width, height))
+        if self._cell > cell:
+            self._warn_of_wide_cells(cell)
         self._columns = max(1, math.ceil(width / self._cell))
         self._rows = max(1, math.ceil(height / self._cell))
         # Walls outside the bounds matter as far as a disc within the bounds reaches them.
@@ -72,6 +77,20 @@ class FreeSpace:
         slack = (1.0 + math.sqrt(0.5)) * self._cell
         self._candidates: IntArray = np.flatnonzero(distances >= radius + clearance - slack)
         self._regions = self._connected(distances)
+
+    def _warn_of_wide_cells(self, cell: float) -> None:
+        half = self._cell * math.sqrt(0.5)
+        _LOG.warning(
+            "free places in %.6g m x %.6g m: cells are %.3g m wide instead of %.3g m, since their "
+            "number is limited to %d; a disc of radius %.3g m may not find its way through gaps "
+            "of less than %.3g m: use smaller bounds or maps",
+            *self._extent,
+            self._cell,
+            cell,
+            _MAX_CELLS,
+            self._radius,
+            2 * (math.hypot(self._radius, half) + half),
+        )
 
     def cells(self, connected_to: tuple[float, float] | None) -> IntArray:
         """Returns the cells that may contain a place for the disc, shape (n,).

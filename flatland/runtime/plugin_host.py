@@ -9,6 +9,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from flatland.errors import PLUGIN_FAULTS, FlatlandError, PluginError, YamlError
+from flatland.foreign_texts import text_of
 from flatland.plugin_api.missing_plugins import read_entries
 from flatland.plugin_api.plugin import FlatlandPlugin, ModelPlugin, WorldPlugin, describe
 from flatland.plugin_api.registry import PluginRegistry
@@ -182,7 +183,7 @@ class PluginHost:
             self.contacts.add_plugin(plugin)
         except PLUGIN_FAULTS as error:
             self._abandon(plugin)
-            text = error.message if isinstance(error, PluginError) else str(error)
+            text = error.message if isinstance(error, PluginError) else text_of(error)
             if isinstance(error, SystemExit) or not (isinstance(error, FlatlandError) or text):
                 text = f"{type(error).__name__} {text}".strip()
             text = f"{describe(plugin)}: {text}"

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from flatland.scenarios.foreign import clean_text
+from flatland.foreign_texts import clean_text
 
 Row = dict[str, Any]
 """The values of one run by column; None for a missing value."""

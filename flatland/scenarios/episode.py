@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import FlatlandError
+from flatland.foreign_texts import text_of
 from flatland.scenarios.columns import Row, clean_row, empty_row
 from flatland.scenarios.connection import StackError
 from flatland.scenarios.controllers import find_controller
 from flatland.scenarios.events import Events
-from flatland.scenarios.foreign import text_of, user_interrupts
+from flatland.scenarios.interrupts import user_interrupts
 from flatland.scenarios.measures import Measures, distance_left, success_weighted_length
 from flatland.scenarios.outline import models_of, outline_of
 from flatland.scenarios.planner import PlanningError, shortest_length

@@ -20,10 +20,10 @@ from typing import Any, Final, TypeVar, cast
 
 from flatland.errors import FlatlandError
 from flatland.extras import require
+from flatland.foreign_texts import clean_text
 from flatland.output_files import append, replaced, write_text
 from flatland.scenarios.columns import COLUMNS, KEY, Row
 from flatland.scenarios.episode import Result
-from flatland.scenarios.foreign import clean_text
 from flatland.scenarios.outline import Line, Outline
 from flatland.version import VERSION
 

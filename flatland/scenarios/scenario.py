@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
+from flatland.foreign_texts import clean_name
 from flatland.geometry import Bounds, Pose, Vector2
 from flatland.scenarios.conditions import Condition
-from flatland.scenarios.foreign import clean_name
 
 Fault = Literal["blind", "frozen"]
 FAULTS: Final[tuple[Fault, ...]] = ("blind", "frozen")

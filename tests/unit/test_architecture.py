@@ -18,6 +18,7 @@ FLOORS = (
     ("checks", "errors", "uncopied"),
     (
         "defaults",
+        "foreign_texts",
         "geometry",
         "graph_names",
         "output_files",

@@ -24,6 +24,18 @@ def test_a_file_that_cannot_be_written_is_named_and_the_old_one_kept(tmp_path):
     assert caught.value.filename == str(missing)
 
 
+def test_two_writers_of_a_file_do_not_share_a_temporary_file(tmp_path):
+    path = tmp_path / "a.bag"
+    with replaced(path) as first:
+        first.write_text("first")
+        with replaced(path) as second:
+            second.write_text("second")
+        assert path.read_text() == "second"
+    assert path.read_text() == "first"
+    assert first.suffix == second.suffix == ".bag"
+    assert list(tmp_path.iterdir()) == [path]
+
+
 def test_the_text_of_a_library_names_the_file(tmp_path):
     path = tmp_path / "a.mp4"
     with pytest.raises(OSError, match=r"^cannot write .*/a\.mp4$"), replaced(path) as part:

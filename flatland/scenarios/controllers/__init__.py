@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from flatland.errors import FlatlandError
+from flatland.foreign_texts import text_of
 from flatland.scenarios.controllers.dynamic_window import DynamicWindow
 from flatland.scenarios.controllers.pursuit import PurePursuit
 from flatland.scenarios.controllers.random_walk import RandomWalk
 from flatland.scenarios.controllers.reactive import Gap, Straight
-from flatland.scenarios.foreign import text_of, user_interrupts
+from flatland.scenarios.interrupts import user_interrupts
 from flatland.scenarios.stack_options import RosVersion, StackCommand
 
 if TYPE_CHECKING:

@@ -350,8 +350,8 @@ MISTAKES: dict[str, Mistake] = {
         (
             "robot.yaml",
             1,
-            '~"points" is concave; the physics uses the convex hull, with an area of 3.5 m² '
-            "instead of 3 m²",
+            '~"points" is concave in body "base"; the physics uses the convex hull, with an area '
+            "of 3.5 m² instead of 3 m²",
             "",
         ),
     ),
@@ -360,8 +360,8 @@ MISTAKES: dict[str, Mistake] = {
         (
             "robot.yaml",
             1,
-            '~"points" is a polygon that crosses itself; the physics uses its convex hull, with '
-            "an area of 2 m²",
+            '~"points" is a polygon of body "base" that crosses itself; the physics uses its '
+            "convex hull, with an area of 2 m²",
             "",
         ),
     ),

@@ -35,6 +35,18 @@ class Failing(flatland.ModelPlugin):
             raise ValueError("out of fuel")
 
 
+class NoTextError(Exception):
+    def __str__(self):
+        raise RuntimeError
+
+
+class Unprintable(flatland.ModelPlugin):
+    """Raises an exception without a text in the first step."""
+
+    def before_physics_step(self, timekeeper):
+        raise NoTextError
+
+
 def read_bag(path: Path | str) -> dict[str, list[tuple[float, Any]]]:
     """Returns the messages of each topic with their times [s]."""
     rosbag = pytest.importorskip("rosbag")
@@ -105,6 +117,17 @@ class TestSimulation:
         assert error.startswith("flatland: stopped at 0.505 s: ValueError: out of fuel")
         assert (files.folder / "old.bag").read_text() == "old"
         assert set(files.folder.iterdir()) - before <= {files.folder / "__pycache__"}
+
+    def test_an_exception_of_a_plugin_without_a_text_is_an_error(
+        self, robot_world, files, declare_plugins, capsys, caplog
+    ):
+        declare_plugins(Unprintable)
+        with (files.folder / "robot.model.yaml").open("a") as model:
+            model.write("- {type: 'test::Unprintable', name: failing}\n")
+        text = "NoTextError: <NoTextError whose text raises RuntimeError>"
+        arguments = ["--duration", "9", "--record", "a.flog"]
+        assert main("run", robot_world, *arguments) == 1
+        assert f"stopped at 0.005 s: {text}" in capsys.readouterr().err
 
 
 class TestCommands:
@@ -187,15 +210,18 @@ class TestInterruption:
     def test_files_contain_what_was_simulated(self, robot_world, tmp_path):
         command = [sys.executable, "-m", "flatland", "run", robot_world, "--duration", "1e6"]
         program = Program([*command, "--bag", "a.bag"])
-        part = tmp_path / "a.part.bag"
-        wait_until("messages", lambda: part.exists() and part.stat().st_size > 100_000)
+
+        def size() -> int:
+            return sum(path.stat().st_size for path in tmp_path.glob("a.*.part.bag"))
+
+        wait_until("messages", lambda: size() > 100_000)
         program.send(signal.SIGTERM)
         assert program.wait() == 128 + signal.SIGTERM, program.output
         end = re.match(r"interrupted after (\S+) s in ", program.stdout)
         assert end
         messages = read_bag(tmp_path / "a.bag")
         assert messages["/tf"][-1][0] == pytest.approx(float(end[1]), abs=0.06)
-        assert not part.exists()
+        assert not list(tmp_path.glob("*.part.*"))
 
 
 class TestFullDisk:

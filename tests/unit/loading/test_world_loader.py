@@ -27,6 +27,26 @@ def test_a_map_outside_the_range_of_the_physics(files, keys, text):
         files.load("{properties: {}, layers: [{name: L, map: map.yaml}]}")
 
 
+@pytest.mark.parametrize(
+    ("origin", "warned"),
+    [
+        ("[500000, 5000000, 0]", "coordinates of 5000000 m are rounded to multiples of 0.5 m"),
+        ("[-40000, 0, 0]", "coordinates of 40000 m are rounded to multiples of 0.00391 m"),
+        ("[20000, -10000, 0]", ""),
+    ],
+)
+def test_coordinates_that_are_rounded_are_named(files, caplog, origin, warned):
+    files.write_map("map", ["   ", " # ", "   "], origin=origin)
+    files.load("{properties: {}, layers: [{name: L, map: map.yaml}]}")
+    if warned:
+        (record,) = (each for each in caplog.records if each.levelno == logging.WARNING)
+        assert f'Layer "L": {warned}, since' in record.getMessage()
+        assert "map.yaml]" in record.getMessage()
+        assert record.hint.startswith("subtract a common offset")
+    else:
+        assert "rounded" not in caplog.text
+
+
 def test_paths_in_included_files_are_relative_to_the_world_file(files, monkeypatch):
     monkeypatch.chdir("/")
     files.write_map("map", ["###", "#.#", "###"])

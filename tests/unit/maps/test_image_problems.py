@@ -89,6 +89,22 @@ PROBLEMS: dict[str, tuple[Pixels | bytes, float, str]] = {
         "none of the 600 pixels is free, so that the layer is a solid block; its values are from 0 "
         'to 100 of 255, where "occupied_thresh" is 165.75; scale them to the range 0 to 255',
     ),
+    "a low part of the range": (
+        ROOM // 8,
+        0.1,
+        "its values are from 0 to 31 of 255, only a low part of their range, and 416 of 600 pixels "
+        "are free; scale the values to the whole range",
+    ),
+    "a low part of 16 bits": (
+        FREE.astype(np.uint16) * 4095,
+        0.05,
+        "its values are at most 4095 of 65535, only a low part of their range, and 416 of 600",
+    ),
+    "only an outline": (
+        np.where(np.arange(30) < 29, ROOM, 0) // 2,
+        0.65,
+        "none of the 600 pixels is free, so that the layer is a solid block; its values are from 0",
+    ),
     "black": (0 * ROOM, 0.65, "none of the 600 pixels is free, so that the layer is a solid block"),
     "white": (
         np.full_like(ROOM, 255),

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+import flatland.runtime.free_space as free_space_module
 from flatland.errors import WorldError
 from flatland.runtime.free_space import FreeSpace, Spread
 
@@ -51,6 +52,26 @@ def two_rooms(door: float) -> DoubleArray:
 
 def places(free_space: FreeSpace, connected_to: tuple[float, float] | None) -> DoubleArray:
     return free_space.places_in(free_space.cells(connected_to), np.random.default_rng(1))
+
+
+def test_cells_that_are_wider_than_the_radius_requires_are_named(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    walls = two_rooms(1.0)
+    assert space(walls, 0.3).size == 200 * 120
+    assert not caplog.records
+    monkeypatch.setattr(free_space_module, "_MAX_CELLS", 6000)
+    wide = space(walls, 0.3)
+    assert wide.size == 100 * 60
+    (text,) = caplog.messages
+    assert text.startswith(
+        "free places in 10 m x 6 m: cells are 0.1 m wide instead of 0.05 m, since their number is "
+        "limited to 6000; a disc of radius 0.3 m may not find its way through gaps of less than "
+    )
+    # What the text states: gaps of that width are passable.
+    width = float(text.split(" m: use")[0].rsplit(" ", 1)[1])
+    places_of_both = places(space(two_rooms(width), 0.3), (1.0, 1.0))
+    assert places_of_both[:, 0].max() > 6
 
 
 def test_no_place_is_missed() -> None:

@@ -1,18 +1,8 @@
-"""Texts and exceptions of foreign code."""
+"""Texts of foreign code."""
 
 from __future__ import annotations
 
-import signal
-
-import pytest
-
-from flatland.scenarios.foreign import (
-    MAX_TEXT,
-    clean_name,
-    clean_text,
-    text_of,
-    user_interrupts,
-)
+from flatland.foreign_texts import MAX_TEXT, clean_name, clean_text, text_of
 
 
 def test_texts_can_be_encoded_and_printed():
@@ -36,14 +26,3 @@ def test_an_object_without_a_text_has_one():
     assert text_of(Unprintable()) == "<Unprintable whose text raises SystemExit>"
     assert text_of(Unprintable(), repr) == "<Unprintable whose text raises TypeError>"
     assert text_of(3) == "3"
-
-
-def test_ctrl_c_differs_from_an_exception():
-    with user_interrupts() as is_interrupted:
-        with pytest.raises(KeyboardInterrupt):
-            raise KeyboardInterrupt
-        assert not is_interrupted()
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-        assert is_interrupted()
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

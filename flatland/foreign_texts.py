@@ -1,17 +1,13 @@
-"""Texts of foreign code and files in the form of results, and exceptions of foreign code.
+"""Texts of foreign code and files.
 
-Controllers raise exceptions of any type with texts of any length, and files have names of any
-bytes. What becomes part of a row is cleaned once, where the row is made.
+Plugins and controllers raise exceptions of any type with texts of any length, and files have names
+of any bytes. Such a text is cleaned once, where it becomes part of a row, an error or a log line.
 """
 
 from __future__ import annotations
 
 import re
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from types import FrameType
+from collections.abc import Callable
 from typing import Any, Final
 
 MAX_TEXT: Final = 4000
@@ -58,31 +54,3 @@ def text_of(value: object, convert: Callable[[Any], str] = str) -> str:
         return _shortened(text, _INVALID, MAX_TEXT // 2)  # There is more text around it.
     except BaseException as error:
         return f"<{type(value).__name__} whose text raises {type(error).__name__}>"
-
-
-@contextmanager
-def user_interrupts() -> Iterator[Callable[[], bool]]:
-    """Distinguishes Ctrl-C from a KeyboardInterrupt that foreign code raises.
-
-    Yields:
-        A function that returns whether the process has received SIGINT since the start of the
-        block. In worker processes and other threads, where Ctrl-C has no effect, it has not.
-    """
-    before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(before):
-        yield lambda: False
-        return
-    is_received = False
-
-    def handle(number: int, frame: FrameType | None) -> None:
-        nonlocal is_received
-        is_received = True
-        before(number, frame)
-
-    signal.signal(signal.SIGINT, handle)
-    try:
-        yield lambda: is_received
-    finally:
-        # Foreign code, or the handler before, may have set another one.
-        if signal.getsignal(signal.SIGINT) is handle:
-            signal.signal(signal.SIGINT, before)
