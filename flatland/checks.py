@@ -10,7 +10,7 @@ import math
 import operator
 import os
 from collections.abc import Iterable, Mapping, Sequence, Set
-from typing import Any, Final, SupportsIndex
+from typing import Any, Final
 
 import numpy as np
 
@@ -35,7 +35,7 @@ def quoted(name: object) -> str:
     return f'"{"".join(characters)}{"..." if len(name) > _MAX_SHOWN else ""}"'
 
 
-def checked_count(name: str, value: object, least: int = 1, most: int | None = None) -> int:
+def checked_count(name: str, value: Any, least: int = 1, most: int | None = None) -> int:
     """Returns an integer of Python for an integer of any type.
 
     Args:
@@ -48,10 +48,10 @@ def checked_count(name: str, value: object, least: int = 1, most: int | None = N
         ValueError: It is no integer, too small or too large.
     """
     limits = f"of at least {least}"
-    if isinstance(value, SupportsIndex) and not isinstance(value, bool | np.bool_):
+    if not isinstance(value, bool | np.bool_):
         try:
             number = operator.index(value)
-        except TypeError:  # an array with several numbers
+        except TypeError:
             number = least - 1
         if number >= least:
             if most is None or number <= most:
@@ -88,6 +88,8 @@ def checked_number(name: str, value: object, unit: str = "") -> float:
     Raises:
         ValueError: It is no number.
     """
+    if type(value) is float:
+        return value
     try:
         return plain_number(value)
     except (TypeError, ValueError):
@@ -145,7 +147,7 @@ def plain_numbers(values: Any, sizes: Sequence[int]) -> tuple[float, ...] | None
     if isinstance(values, str | bytes | bytearray | Mapping | Set):
         return None
     try:
-        numbers = tuple(plain_number(value) for value in values)
+        numbers = tuple(map(plain_number, values))
     except (TypeError, ValueError):
         return None
     return numbers if len(numbers) in sizes else None

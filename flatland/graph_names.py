@@ -16,7 +16,9 @@ _LEGAL_NAME = re.compile(r"[A-Za-z/][\w/]*", re.ASCII)
 
 def clean_name(name: str) -> str:
     """Returns a name without repeated slashes and without a slash at the end."""
-    return re.sub("/+", "/", name).removesuffix("/")
+    if "//" in name:
+        name = re.sub("/+", "/", name)
+    return name.removesuffix("/")
 
 
 def check_model_name(name: object, *, is_of_file: bool = False) -> None:

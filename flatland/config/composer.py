@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import yaml
 
@@ -17,7 +17,7 @@ from flatland.config.inputs import Inputs
 from flatland.config.node import MAX_NESTING, ListNode, MapNode, Node, NullNode, ScalarNode, Source
 from flatland.errors import YamlError
 
-_Loader: type = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+_Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _NULLS = frozenset(("", "~", "null", "Null", "NULL"))
 _NULL_TAG = "tag:yaml.org,2002:null"
 NOT_YAML_TEXT = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -85,8 +85,13 @@ class Composer:
         if self._invalid_indices:
             text = NOT_YAML_TEXT.sub(_REPLACEMENT, text)
         try:
-            for event in yaml.parse(_without_stray_tabs(text), Loader=_Loader):
-                self._handle(event)
+            # Not `yaml.parse`, which adds a call to each event.
+            loader = _Loader(_without_stray_tabs(text))
+            try:
+                while loader.check_event():
+                    self._handle(loader.get_event())
+            finally:
+                loader.dispose()
         except yaml.MarkedYAMLError as error:
             mark = error.problem_mark or error.context_mark
             line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)

@@ -85,13 +85,13 @@ def _warn_about_degrees(
     config: YamlReader, minimum: float, maximum: float, increment: float, count: int
 ) -> None:
     """Logs a warning about angles that are probably in degrees, if the reader collects errors."""
-    numbers = {"min": minimum, "max": maximum, "increment": increment}
-    angles = ", ".join(f"{key}: {number:g}" for key, number in numbers.items())
-    hint = ", ".join(f"{key}: {math.radians(number):.6g}" for key, number in numbers.items())
+    angles = f"min: {minimum:g}, max: {maximum:g}, increment: {increment:g}"
     turns = max(map(abs, (minimum, maximum, maximum - minimum))) / math.tau
     if turns > MAX_TURNS:
         what = f"{{{angles}}}, which is more than a full turn"
-        config.warn("angle", what, f"angles are in radians; for degrees, write {{{hint}}}")
+        low, high, step = map(math.radians, (minimum, maximum, increment))
+        hint = f"{{min: {low:.6g}, max: {high:.6g}, increment: {step:.6g}}}"
+        config.warn("angle", what, f"angles are in radians; for degrees, write {hint}")
     elif (
         count > _FEW_BEAMS
         and abs(increment) >= _WIDE

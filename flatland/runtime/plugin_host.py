@@ -105,9 +105,10 @@ class PluginHost:
             YamlError: An entry has no name or type.
         """
         listed = list(entries)
-        read_entries(listed, model)
+        named = read_entries(listed, model)
         entries = [entry for entry in listed if entry.is_complete]
-        named = read_entries(entries, model)
+        if len(entries) < len(listed):
+            named = read_entries(entries, model)
         error = self.registry.missing_plugins_error(named)
         if error is None:
             return entries
