@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from flatland.copying.kinds import Kind, kind_of
@@ -53,17 +53,27 @@ class Copier:
         kind = self._kinds.get(type(obj)) or self._new_kind(obj)
         if kind.is_immutable:
             return obj
-        memo = self.memo
-        if id(obj) in memo:
-            return memo[id(obj)]
+        memo, key = self.memo, id(obj)
+        if key in memo:
+            return memo[key]
         made = kind.make(obj, self)
         # To make the parts of a tuple or the like may have made a copy of the tuple.
-        if id(obj) in memo:
-            return memo[id(obj)]
-        self.add(obj, made)
+        if key in memo:
+            return memo[key]
+        memo[key] = made
+        self._originals.append(obj)
         if made is not obj:
             self._pending.append((kind, obj, made))
         return made
+
+    def each(self, objects: Iterable[Any]) -> list[Any]:
+        """Returns the copies of several objects in order, like calls for each of them."""
+        kinds, copies = self._kinds, []
+        for obj in objects:
+            kind = kinds.get(type(obj))
+            is_immutable = kind is not None and kind.is_immutable
+            copies.append(obj if is_immutable else self(obj))
+        return copies
 
     def fill(self, original: object, made: object) -> None:
         """Completes an object that exists already as the copy of another one."""

@@ -16,6 +16,7 @@ import enum
 import fractions
 import functools
 import gc
+import itertools
 import logging
 import numbers
 import operator
@@ -62,6 +63,9 @@ class Copy(Protocol):
 
     def __call__(self, obj: Any) -> Any:
         """Returns the copy of an object, which may still be incomplete."""
+
+    def each(self, objects: Iterable[Any]) -> list[Any]:
+        """Returns the copies of several objects in order."""
 
     def complete(self) -> None:
         """Completes the copies so far, except for hashed containers."""
@@ -186,7 +190,7 @@ class _Composite(_Fixed):
 
     def make(self, obj: Any, copy: Copy) -> Any:
         parts = list(self._parts(obj))
-        copies = [copy(part) for part in parts]
+        copies = copy.each(parts)
         if all(map(operator.is_, parts, copies)):
             return obj
         if self._is_hashed:
@@ -293,7 +297,7 @@ class _List(Kind):
         return made
 
     def fill(self, obj: Any, made: Any, copy: Copy) -> None:
-        self._base.extend(made, [copy(item) for item in obj])
+        self._base.extend(made, copy.each(obj))
 
 
 class _Set(Kind):
@@ -314,7 +318,7 @@ class _Set(Kind):
         return set.__new__(type(obj))
 
     def fill(self, obj: Any, made: Any, copy: Copy) -> Callable[[], None]:
-        items = [copy(item) for item in obj]
+        items = copy.each(obj)
         return lambda: set.update(made, items)
 
 
@@ -348,7 +352,8 @@ class _Dict(Kind):
     def fill(self, obj: Any, made: Any, copy: Copy) -> Callable[[], None]:
         if self._base is collections.defaultdict:
             made.default_factory = copy(obj.default_factory)
-        items = [(copy(key), copy(value)) for key, value in obj.items()]
+        copies = copy.each(itertools.chain.from_iterable(obj.items()))
+        items = list(zip(copies[::2], copies[1::2], strict=True))
         # The hash of a key may depend on what it contains.
         return lambda: self._update(made, items)
 
@@ -472,14 +477,21 @@ class _Object(Kind):
 
     def fill(self, obj: Any, made: Any, copy: Copy) -> Callable[[], None] | None:
         if self._has_dict:
-            attributes = vars(made)
-            for name, value in vars(obj).items():
-                make = self._outside.get(name)
-                attributes[name] = copy(value) if make is None else make()
+            attributes, inside = vars(made), vars(obj).copy()
+            for name, make in self._outside.items():
+                if name in inside:
+                    del inside[name]
+                    attributes[name] = make()
+            attributes.update(zip(inside, copy.each(inside.values()), strict=True))
+        members, values = [], []
         for member in self._slots:
-            value = _slot(member, obj)
-            if value is not MISSING:
-                member.__set__(made, copy(value))
+            try:
+                values.append(member.__get__(obj))
+            except AttributeError:  # not set
+                continue
+            members.append(member)
+        for member, value in zip(members, copy.each(values), strict=True):
+            member.__set__(made, value)
         for name in self._outside_slots:
             object.__setattr__(made, name, self._outside[name]())
         return None if self._items is None else self._items.fill(obj, made, copy)
