@@ -1186,5 +1186,6 @@ class _Settings:
     def __setstate__(self, state: tuple[Any, ...]) -> None:
         """Restores a saved state."""
         world = self._world
-        world.seed, source, world.velocity_iterations, world.position_iterations = state
+        world.seed, source, world._velocity_iterations, world._position_iterations = state
+        world.physics.jobs.interrupt()
         world.source.restore(source)

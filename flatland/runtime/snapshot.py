@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from flatland.physics import PhysicsWorld
     from flatland.plugin_api.plugin import WorldPlugin
     from flatland.plugin_api.port_registry import PortRegistry
-    from flatland.plugin_api.ports import Output, PortUser
+    from flatland.plugin_api.ports import Output, OwnedSubscription, PortUser
     from flatland.runtime.layer_set import LayerSet
     from flatland.runtime.model_set import ModelSet
     from flatland.runtime.observer import Observers
@@ -125,9 +126,11 @@ class _Ports:
     def __init__(self, ports: PortRegistry, observers: Observers) -> None:
         outputs, commands = ports.kept
         self.outputs = [*ports.outputs.values(), *outputs]
-        self.commands = [c for same in ports.commands.values() for c in same] + commands
-        subscribed = [output for output in self.outputs if output._subscribers]
-        self.subscriptions = [entry for output in subscribed for entry in output.of_plugins]
+        self.commands = [*itertools.chain.from_iterable(ports.commands.values()), *commands]
+        self.subscriptions: list[OwnedSubscription] = []
+        for output in self.outputs:
+            if output._subscribers:
+                self.subscriptions += output.of_plugins
         self.observers = observers.of_plugins
 
     def resume(self, plugins: Collection[PortUser], observers: Observers) -> None:
@@ -254,7 +257,8 @@ class Snapshots:
         for plugin in revived_plugins:
             self._check_revivable(plugin)
         newer = [p for p in self._host.world_plugins if p not in snapshot._world_plugins]
-        self._host.shut_down(newer)
+        if newer:
+            self._host.shut_down(newer)
         for model in reversed(models):
             if model not in kept:
                 self._models.delete(model.name)
@@ -290,19 +294,21 @@ class Snapshots:
     ) -> None:
         """Notifies the observers of ports and models that were restored or removed."""
         observers = self._observers
-        for output in _without(before.outputs, now.outputs):
-            output.closed = True
-            observers.output_closed(output)
-        for command in _without(before.commands, now.commands):
-            command.closed = True
-            observers.command_closed(command)
-        for output in _without(now.outputs, before.outputs):
-            observers.output_opened(output)
-        for command in _without(now.commands, before.commands):
-            observers.command_opened(command)
+        if before.outputs != now.outputs or before.commands != now.commands:
+            for output in _without(before.outputs, now.outputs):
+                output.closed = True
+                observers.output_closed(output)
+            for command in _without(before.commands, now.commands):
+                command.closed = True
+                observers.command_closed(command)
+            for output in _without(now.outputs, before.outputs):
+                observers.output_opened(output)
+            for command in _without(now.commands, before.commands):
+                observers.command_opened(command)
         for plugin in revived_plugins:
             plugin.ros = observers.plugin_ros(plugin)
-        now.resume(revived_plugins, observers)
+        if revived_plugins:
+            now.resume(revived_plugins, observers)
         for model in revived:
             observers.model_added(model)
 
