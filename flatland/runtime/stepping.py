@@ -253,7 +253,7 @@ class Stepping:
     ) -> StepRun:
         world, host, timekeeper = self._world, self._host, self._timekeeper
         is_single = (begun is None and self._prepare()) or self._is_watched
-        start, step = timekeeper.sim_time_ns, timekeeper.step_size_ns
+        start, step = self._physics.time_ns, timekeeper.step_size_ns
         run = Run(
             start,
             step,
@@ -354,8 +354,8 @@ class Stepping:
         self._observers.step_started()
 
     def _set_time(self, time_ns: int) -> None:
-        if time_ns != self._timekeeper.sim_time_ns:
-            self._timekeeper.sim_time_ns = time_ns
+        if time_ns != self._physics.time_ns:
+            self._physics.time_ns = time_ns
             self._observers.time_advanced(time_ns)
 
     def _examine(self, report: tuple[list[int], list[int]] | None, *, calls_physics: bool) -> None:
