@@ -21,7 +21,7 @@ from flatland.scenarios.workers import WorkerLimits, run_in_processes
 
 # Drives straight to the goal by the odometry, one command for each scan.
 NODE = """
-import math, os, signal, subprocess, sys, threading
+import math, os, signal, subprocess, sys
 import rclpy
 from geometry_msgs.msg import PoseStamped, TransformStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
@@ -94,12 +94,6 @@ class Driver(Node):
             sys.exit(0)
         if mode == "kills":
             os.kill(os.getppid(), signal.SIGKILL)
-        if mode == "floods":
-            threading.Thread(target=self.flood, daemon=True).start()
-
-    def flood(self):
-        while rclpy.ok():
-            self.commands.publish(Twist())
 
     def on_odometry(self, message):
         self.poses[stamp_of(message)] = message.pose.pose
@@ -306,14 +300,6 @@ def test_a_stack_that_fails_is_a_failed_run(drive: Drive) -> None:
     assert "sent no command for 10 s" in errors["silent"]
     # The node ends the worker process, and is ended with it.
     assert "ended in each of 3 attempts (signal 9)" in errors["kills"]
-
-
-def test_a_stack_that_floods_the_simulator_is_a_failed_run(drive: Drive) -> None:
-    # In real time, since a lockstep on a busy machine may be faster than the commands.
-    (row,) = drive("floods", pace="real-time")
-    assert row["outcome"] == "error"
-    # Ten for each step.
-    assert "sent more than 2000 commands per second" in row["error"]
 
 
 def test_goals_are_sent_to_an_action(drive: Drive) -> None:
