@@ -252,7 +252,7 @@ class Stepping:
         is_paced: bool,
     ) -> StepRun:
         world, host, timekeeper = self._world, self._host, self._timekeeper
-        is_single = (begun is None and self._prepare()) or self._is_watched
+        is_single = (begun is None and self._prepare()) or n == 1 or self._is_watched
         start, step = self._physics.time_ns, timekeeper.step_size_ns
         run = Run(
             start,
