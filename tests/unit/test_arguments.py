@@ -11,9 +11,19 @@ import numpy as np
 import pytest
 from wrong_values import HUGE, INTERNAL, NO_COUNTS, NO_NUMBERS, NO_PATHS, NO_POSES
 
-from flatland import DynamicsLimits, FlatlandError, ModelSpec, Timekeeper, Twist, UpdateTimer, World
+from flatland import (
+    Body,
+    DynamicsLimits,
+    FlatlandError,
+    ModelSpec,
+    Timekeeper,
+    Twist,
+    UpdateTimer,
+    World,
+)
 from flatland.checks import quoted, shown
 from flatland.drawing import save
+from flatland.physics import PhysicsFixture
 from flatland.recording import Replay
 from flatland.runtime.batch import step_worlds
 from flatland.simulation import Simulation
@@ -22,6 +32,33 @@ from flatland.worldgen import generate, maze
 TEXT: Final = "{bodies: [{name: b, footprints: []}]}"
 
 Call = Callable[[World, Any], object]
+
+
+def body_of(world: World) -> Body:
+    return world.model("robot").bodies[0]
+
+
+def fixture_of(world: World) -> PhysicsFixture:
+    return body_of(world).fixtures[0]
+
+
+# By the name in the error.
+BODY_NUMBERS: dict[str, Call] = {
+    "x": lambda w, v: body_of(w).set_pose(v, 0, 0),
+    "theta": lambda w, v: body_of(w).set_pose(0, 0, theta=v),
+    "vx": lambda w, v: body_of(w).set_velocity(v, 0, 0),
+    "omega": lambda w, v: body_of(w).set_velocity(0, 0, v),
+    "torque": lambda w, v: body_of(w).apply_torque(v),
+    "factor": lambda w, v: body_of(w).scale_shapes(v),
+    "density": lambda w, v: setattr(fixture_of(w), "density", v),
+    "friction": lambda w, v: setattr(fixture_of(w), "friction", v),
+    "radius": lambda w, v: body_of(w).create_circle((0, 0), v, density=1),
+    "restitution": lambda w, v: body_of(w).create_circle((0, 0), 1, density=1, restitution=v),
+    "linear_damping": lambda w, v: w.physics.create_body("static", (0, 0, 0), linear_damping=v),
+}
+# What is named if a number is out of range.
+PARTS: Final = {"x": "pose", "theta": "pose angle", "vx": "velocity"}
+NO_POINTS: Final = ("ab", None, 5, (1,), (1, "2"), (HUGE, 0), (math.nan, 0), (1j, 0))
 
 # A name for the id, the call, what the error names, and invalid values.
 TABLE: list[tuple[str, Call, str, Sequence[Any]]] = [
@@ -187,6 +224,55 @@ TABLE: list[tuple[str, Call, str, Sequence[Any]]] = [
         lambda w, v: w.models[0].set_pose(v, 0, 0),
         "pose",
         ("3", True, None, HUGE, math.nan),
+    ),
+    *(
+        (f"body {name}", call, name, ("3", None, 1j, np.complex128(1j), [1]))
+        for name, call in BODY_NUMBERS.items()
+    ),
+    *(
+        (f"body {name} out of range", call, PARTS.get(name, name), (HUGE, -HUGE, math.nan))
+        for name, call in BODY_NUMBERS.items()
+    ),
+    ("body force", lambda w, v: body_of(w).apply_force(v, (0, 0)), "force", NO_POINTS),
+    ("body point", lambda w, v: body_of(w).apply_force((0, 0), v), "point", NO_POINTS),
+    ("body awake", lambda w, v: setattr(body_of(w), "awake", v), "awake", ("no", [1], 1j)),
+    (
+        "body material",
+        lambda w, v: body_of(w).set_material(v),
+        "material",
+        ("abc", None, 5, (1, 2), (1, "2", 3), (HUGE, 0, 0)),
+    ),
+    (
+        "fixture is_sensor",
+        lambda w, v: setattr(fixture_of(w), "is_sensor", v),
+        "is_sensor",
+        ("no", [1], 1j),
+    ),
+    (
+        "fixture category_bits",
+        lambda w, v: setattr(fixture_of(w), "category_bits", v),
+        "category_bits",
+        ("1", None, 1.5, -1, 65536, HUGE),
+    ),
+    (
+        "fixture center",
+        lambda w, v: body_of(w).create_circle(v, 1, density=1),
+        "center",
+        (*NO_POINTS, (1, 2, 3)),
+    ),
+    (
+        "joint anchor_a",
+        lambda w, v: w.physics.create_weld_joint(body_of(w), w.layers[0].body, v, (0, 0)),
+        "anchor_a",
+        (*NO_POINTS, (1, 2, 3)),
+    ),
+    (
+        "joint limits",
+        lambda w, v: w.physics.create_revolute_joint(
+            body_of(w), w.layers[0].body, (0, 0), (0, 0), limits=v
+        ),
+        "limit",
+        ("ab", 5, (1,), (HUGE, 0)),
     ),
     ("worldgen kind", lambda _, v: generate(v, 1), "kind", (None, 5, [1], "castle")),
     ("worldgen seed", lambda _, v: maze(v), "seed", NO_COUNTS),

@@ -1,10 +1,12 @@
 #include <pybind11/stl.h>
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
+#include "bindings/named.h"
 #include "bindings/tuples.h"
 #include "world/bodies.h"
 #include "world/motions.h"
@@ -29,14 +31,22 @@ const char* type_name(b2BodyType type) {
   return type == b2_kinematicBody ? "kinematic" : "dynamic";
 }
 
+// More coordinates, such as those of a geometry_msgs/Vector3, are ignored.
+std::pair<double, double> first_two(const Named<std::vector<double>>& vector, const char* name) {
+  const std::vector<double>& numbers = vector.as(name);
+  if (numbers.size() >= 2) return {numbers[0], numbers[1]};
+  throw py::value_error(std::string(name) + " must have two coordinates, got " +
+                        std::to_string(numbers.size()));
+}
+
 void bind_motion(py::class_<BodyHandle, Handle>& body) {
   body.def_property_readonly(
       "pose", [](const BodyHandle& self) { return to_python(pose_of(self.core(), self.id)); },
       "Pose (x, y, theta) of the origin of the body in the world frame [m, rad].");
   body.def(
       "set_pose",
-      [](const BodyHandle& self, double x, double y, double theta) {
-        set_pose(self.core(), self.id, {x, y, theta});
+      [](const BodyHandle& self, Named<double> x, Named<double> y, Named<double> theta) {
+        set_pose(self.core(), self.id, {x.as("x"), y.as("y"), theta.as("theta")});
       },
       py::arg("x"), py::arg("y"), py::arg("theta"), R"(
 Moves the origin of the body to a pose in the world frame and wakes the body.
@@ -52,8 +62,8 @@ Raises:
       "Velocity (vx, vy, omega) of the origin of the body in the world frame [m/s, rad/s].");
   body.def(
       "set_velocity",
-      [](const BodyHandle& self, double vx, double vy, double omega) {
-        set_velocity(self.core(), self.id, {vx, vy, omega});
+      [](const BodyHandle& self, Named<double> vx, Named<double> vy, Named<double> omega) {
+        set_velocity(self.core(), self.id, {vx.as("vx"), vy.as("vy"), omega.as("omega")});
       },
       py::arg("vx"), py::arg("vy"), py::arg("omega"), R"(
 Sets the velocity of the origin of the body in the world frame; static bodies ignore it.
@@ -70,13 +80,11 @@ Raises:
 )");
   body.def(
       "apply_force",
-      [](const BodyHandle& self, const std::vector<double>& force,
-         const std::vector<double>& point) {
-        // More coordinates, such as those of a geometry_msgs/Vector3, are ignored.
-        if (force.size() < 2 || point.size() < 2) {
-          throw py::value_error("force and point must have two coordinates");
-        }
-        apply_force(self.core(), self.id, force[0], force[1], point[0], point[1]);
+      [](const BodyHandle& self, const Named<std::vector<double>>& force,
+         const Named<std::vector<double>>& point) {
+        const auto [fx, fy] = first_two(force, "force");
+        const auto [px, py] = first_two(point, "point");
+        apply_force(self.core(), self.id, fx, fy, px, py);
       },
       py::arg("force"), py::arg("point"), R"(
 Applies a force to a dynamic body during the next step and wakes the body.
@@ -92,7 +100,9 @@ Raises:
 )");
   body.def(
       "apply_torque",
-      [](const BodyHandle& self, double torque) { apply_torque(self.core(), self.id, torque); },
+      [](const BodyHandle& self, Named<double> torque) {
+        apply_torque(self.core(), self.id, torque.as("torque"));
+      },
       py::arg("torque"), R"(
 Applies a torque to a dynamic body during the next step and wakes the body.
 
@@ -106,7 +116,10 @@ Raises:
 )");
   body.def_property(
       "awake", [](const BodyHandle& self) { return read(self).IsAwake(); },
-      [](const BodyHandle& self, bool awake) { self.core().change_body(self.id)->SetAwake(awake); },
+      [](const BodyHandle& self, Named<bool> awake) {
+        const bool is_awake = awake.as("awake");
+        self.core().change_body(self.id)->SetAwake(is_awake);
+      },
       R"(
 Whether the body is awake; settable. Box2D simulates only bodies that are awake.
 
@@ -125,7 +138,9 @@ Raises:
 )");
   body.def(
       "scale_shapes",
-      [](const BodyHandle& self, double factor) { scale_shapes(self.core(), self.id, factor); },
+      [](const BodyHandle& self, Named<double> factor) {
+        scale_shapes(self.core(), self.id, factor.as("factor"));
+      },
       py::arg("factor"), R"(
 Multiplies the lengths of all shapes by a factor, relative to the origin of the body.
 
@@ -185,10 +200,11 @@ Raises:
 void bind_all_bodies(WorldClass& world) {
   world.def(
       "create_body",
-      [](const PyWorld& self, const std::string& type, const PyPose& pose, double linear_damping,
-         double angular_damping) {
-        return BodyHandle(
-            self, create_body(*self.core, body_type(type), pose, linear_damping, angular_damping));
+      [](const PyWorld& self, const std::string& type, const Named<PyPose>& pose,
+         Named<double> linear_damping, Named<double> angular_damping) {
+        return BodyHandle(self, create_body(*self.core, body_type(type), pose.as("pose"),
+                                            linear_damping.as("linear_damping"),
+                                            angular_damping.as("angular_damping")));
       },
       py::arg("body_type"), py::arg("pose"), py::kw_only(), py::arg("linear_damping") = 0.0,
       py::arg("angular_damping") = 0.0, R"(

@@ -10,6 +10,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
+#include "bindings/named.h"
 #include "world/errors.h"
 
 namespace py = pybind11;
@@ -186,24 +187,27 @@ The attributes that can be set, and only those, expire after the call of `pre_so
   bind_row(contact, [](const PreSolveContact& self) -> const ContactRow& { return self.row(); });
   contact.def_property(
       "enabled", [](const PreSolveContact& self) { return self.contact().IsEnabled(); },
-      [](PreSolveContact& self, bool enabled) { self.contact().SetEnabled(enabled); },
+      [](PreSolveContact& self, Named<bool> enabled) {
+        self.contact().SetEnabled(enabled.as("enabled"));
+      },
       "Whether the solver separates the fixtures in this step.");
   contact.def_property(
       "friction", [](const PreSolveContact& self) { return self.contact().GetFriction(); },
-      [](PreSolveContact& self, double friction) {
-        self.contact().SetFriction(checked_not_negative(friction, "friction"));
+      [](PreSolveContact& self, Named<double> friction) {
+        self.contact().SetFriction(checked_not_negative(friction.as("friction"), "friction"));
       },
       "Friction coefficient of the contact.");
   contact.def_property(
       "restitution", [](const PreSolveContact& self) { return self.contact().GetRestitution(); },
-      [](PreSolveContact& self, double restitution) {
-        self.contact().SetRestitution(checked_not_negative(restitution, "restitution"));
+      [](PreSolveContact& self, Named<double> restitution) {
+        self.contact().SetRestitution(
+            checked_not_negative(restitution.as("restitution"), "restitution"));
       },
       "Restitution coefficient of the contact.");
   contact.def_property(
       "tangent_speed", [](const PreSolveContact& self) { return self.contact().GetTangentSpeed(); },
-      [](PreSolveContact& self, double speed) {
-        self.contact().SetTangentSpeed(checked_finite(speed, "tangent_speed"));
+      [](PreSolveContact& self, Named<double> speed) {
+        self.contact().SetTangentSpeed(checked_finite(speed.as("tangent_speed"), "tangent_speed"));
       },
       "Speed of the surface along the tangent [m/s], as for a conveyor belt.");
 }

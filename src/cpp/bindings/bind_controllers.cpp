@@ -9,6 +9,7 @@
 
 #include "bindings/bindings.h"
 #include "bindings/controllers.h"
+#include "bindings/named.h"
 #include "world/easing.h"
 
 namespace py = pybind11;
@@ -147,9 +148,11 @@ template <typename Kind, typename Class>
 void bind_velocities(Class& controller) {
   controller.def(
       "set_target",
-      [](const ControllerHandle& self, double forward, double sideways, double omega) {
+      [](const ControllerHandle& self, Named<double> forward, Named<double> sideways,
+         Named<double> omega) {
         // A velocity that is out of range is refused when it is applied to the body.
-        set_command(changed_controller(self), {forward, sideways, omega});
+        set_command(changed_controller(self),
+                    {forward.as("forward"), sideways.as("sideways"), omega.as("omega")});
       },
       py::arg("forward"), py::arg("sideways"), py::arg("omega"),
       "Sets the commanded velocity, from the next step on.");
@@ -208,8 +211,10 @@ Raises:
   bind_velocities<TwistMotion>(controller);
   controller.def(
       "set_velocity",
-      [](const VelocityHandle& self, double forward, double sideways, double omega) {
-        motion_of<TwistMotion>(self).velocity = {forward, sideways, omega};
+      [](const VelocityHandle& self, Named<double> forward, Named<double> sideways,
+         Named<double> omega) {
+        motion_of<TwistMotion>(self).velocity = {forward.as("forward"), sideways.as("sideways"),
+                                                 omega.as("omega")};
       },
       py::arg("forward"), py::arg("sideways"), py::arg("omega"),
       "Sets the velocity from which the limits of acceleration are applied.");

@@ -7,6 +7,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
+#include "bindings/named.h"
 #include "bindings/tuples.h"
 #include "bindings/values.h"
 #include "world/bodies.h"
@@ -19,19 +20,26 @@ namespace {
 
 constexpr std::int64_t kAllBits = 0xFFFF;
 
-FixtureOptions options_of(double density, double friction, double restitution, bool is_sensor,
-                          std::int64_t category_bits, std::int64_t mask_bits) {
-  return {density,
-          friction,
-          restitution,
-          is_sensor,
-          checked_bits(category_bits, "category_bits"),
-          checked_bits(mask_bits, "mask_bits")};
+using NamedBits = Named<std::int64_t>;
+
+std::uint16_t bits_as(const char* name, NamedBits bits) {
+  return checked_bits(bits.as(name), name);
 }
 
-FixtureHandle py_create_polygon(const BodyHandle& body, const Array<double>& points, double density,
-                                double friction, double restitution, bool is_sensor,
-                                std::int64_t category_bits, std::int64_t mask_bits) {
+FixtureOptions options_of(Named<double> density, Named<double> friction, Named<double> restitution,
+                          Named<bool> is_sensor, NamedBits category_bits, NamedBits mask_bits) {
+  return {density.as("density"),
+          friction.as("friction"),
+          restitution.as("restitution"),
+          is_sensor.as("is_sensor"),
+          bits_as("category_bits", category_bits),
+          bits_as("mask_bits", mask_bits)};
+}
+
+FixtureHandle py_create_polygon(const BodyHandle& body, const Array<double>& points,
+                                Named<double> density, Named<double> friction,
+                                Named<double> restitution, Named<bool> is_sensor,
+                                NamedBits category_bits, NamedBits mask_bits) {
   check_shape(points, 2, "points");
   std::vector<b2Vec2> corners;
   const auto view = points.unchecked<2>();
@@ -43,12 +51,12 @@ FixtureHandle py_create_polygon(const BodyHandle& body, const Array<double>& poi
   return {body.world, create_polygon(body.core(), body.id, corners, options)};
 }
 
-std::size_t py_create_edges(const BodyHandle& body, const Array<float>& edges, double friction,
-                            double restitution, std::int64_t category_bits,
-                            std::int64_t mask_bits) {
+std::size_t py_create_edges(const BodyHandle& body, const Array<float>& edges,
+                            Named<double> friction, Named<double> restitution,
+                            NamedBits category_bits, NamedBits mask_bits) {
   check_shape(edges, 4, "edges");
   const FixtureOptions options =
-      options_of(0.0, friction, restitution, false, category_bits, mask_bits);
+      options_of(Named(0.0), friction, restitution, Named(false), category_bits, mask_bits);
   // A copy, because other threads may write to the array while the GIL is released.
   const std::vector<float> rows(edges.data(), edges.data() + edges.size());
   // Safe without the GIL: the world is in exclusive use by this thread, and no Python object is
@@ -60,21 +68,22 @@ std::size_t py_create_edges(const BodyHandle& body, const Array<float>& edges, d
 }
 
 // Converts a sequence of a material.
-Material checked_material(const Numbers<3>& shares) {
+Material checked_material(const Named<Numbers<3>>& material) {
+  const Numbers<3> shares = material.as("material");
   const double reflectance = shares[0], transmission = shares[1], specular = shares[2];
   const auto checked_share = [](double share, const char* name) {
     if (share >= 0.0 && share <= 1.0) return static_cast<float>(share);
     throw std::invalid_argument(std::string(name) + " must be from 0 to 1, got " + to_text(share));
   };
-  const Material material{checked_share(reflectance, "reflectance"),
-                          checked_share(transmission, "transmission"),
-                          checked_share(specular, "specular")};
+  const Material checked{checked_share(reflectance, "reflectance"),
+                         checked_share(transmission, "transmission"),
+                         checked_share(specular, "specular")};
   constexpr double kTolerance = 1e-9;
   if (transmission + specular > 1.0 + kTolerance) {
     throw std::invalid_argument("transmission + specular must be at most 1, got " +
                                 to_text(transmission + specular));
   }
-  return material;
+  return checked;
 }
 
 std::optional<PyMaterial> material_of(const FixtureHandle& fixture) {
@@ -103,13 +112,14 @@ void change_filter(const FixtureHandle& fixture, std::uint16_t b2Filter::*bits,
 void bind_creation(py::class_<BodyHandle, Handle>& body) {
   body.def(
       "create_circle",
-      [](const BodyHandle& self, const PyPoint& center, double radius, double density,
-         double friction, double restitution, bool is_sensor, std::int64_t category_bits,
-         std::int64_t mask_bits) {
+      [](const BodyHandle& self, const Named<PyPoint>& given_center, Named<double> radius,
+         Named<double> density, Named<double> friction, Named<double> restitution,
+         Named<bool> is_sensor, NamedBits category_bits, NamedBits mask_bits) {
+        const PyPoint center = given_center.as("center");
         const FixtureOptions options =
             options_of(density, friction, restitution, is_sensor, category_bits, mask_bits);
-        return FixtureHandle(
-            self.world, create_circle(self.core(), self.id, center[0], center[1], radius, options));
+        return FixtureHandle(self.world, create_circle(self.core(), self.id, center[0], center[1],
+                                                       radius.as("radius"), options));
       },
       py::arg("center"), py::arg("radius"), py::kw_only(), py::arg("density"),
       py::arg("friction") = 0.0, py::arg("restitution") = 0.0, py::arg("is_sensor") = false,
@@ -185,7 +195,7 @@ Raises:
       "Returns the edges (x1, y1, x2, y2) of the body in the body frame [m], shape (n, 4).");
   body.def(
       "set_material",
-      [](const BodyHandle& self, const Numbers<3>& material) {
+      [](const BodyHandle& self, const Named<Numbers<3>>& material) {
         const Material checked = checked_material(material);
         World& world = self.core();
         const b2Body* changed = world.change_body(self.id);
@@ -240,7 +250,9 @@ The counter-clockwise corners of a polygon, the end points of an edge; empty for
 void bind_surface(py::class_<FixtureHandle, Handle>& fixture) {
   fixture.def_property(
       "density", [](const FixtureHandle& self) { return read(self).GetDensity(); },
-      [](const FixtureHandle& self, double value) { set_density(self.core(), self.id, value); },
+      [](const FixtureHandle& self, Named<double> value) {
+        set_density(self.core(), self.id, value.as("density"));
+      },
       R"(
 Density [kg/m^2]; settable, which also sets the mass of the body.
 
@@ -249,7 +261,9 @@ Raises:
 )");
   fixture.def_property(
       "friction", [](const FixtureHandle& self) { return read(self).GetFriction(); },
-      [](const FixtureHandle& self, double value) { set_friction(self.core(), self.id, value); },
+      [](const FixtureHandle& self, Named<double> value) {
+        set_friction(self.core(), self.id, value.as("friction"));
+      },
       R"(
 Friction coefficient; settable, also for present contacts.
 
@@ -259,24 +273,26 @@ Raises:
   def_reading(fixture, "restitution", &b2Fixture::GetRestitution, "Restitution coefficient.");
   fixture.def_property(
       "is_sensor", [](const FixtureHandle& self) { return read(self).IsSensor(); },
-      [](const FixtureHandle& self, bool value) { set_sensor(self.core(), self.id, value); },
+      [](const FixtureHandle& self, Named<bool> value) {
+        set_sensor(self.core(), self.id, value.as("is_sensor"));
+      },
       "Whether the fixture is a sensor, which detects contacts but stops no ray; settable.");
   fixture.def_property(
       "category_bits",
       [](const FixtureHandle& self) { return read(self).GetFilterData().categoryBits; },
-      [](const FixtureHandle& self, std::int64_t bits) {
-        change_filter(self, &b2Filter::categoryBits, checked_bits(bits, "category_bits"));
+      [](const FixtureHandle& self, NamedBits bits) {
+        change_filter(self, &b2Filter::categoryBits, bits_as("category_bits", bits));
       },
       "Categories of the fixture, 16 bits; settable.");
   fixture.def_property(
       "mask_bits", [](const FixtureHandle& self) { return read(self).GetFilterData().maskBits; },
-      [](const FixtureHandle& self, std::int64_t bits) {
-        change_filter(self, &b2Filter::maskBits, checked_bits(bits, "mask_bits"));
+      [](const FixtureHandle& self, NamedBits bits) {
+        change_filter(self, &b2Filter::maskBits, bits_as("mask_bits", bits));
       },
       "Categories that the fixture collides with, 16 bits; settable.");
   fixture.def_property(
       "material", &material_of,
-      [](const FixtureHandle& self, const Numbers<3>& material) {
+      [](const FixtureHandle& self, const Named<Numbers<3>>& material) {
         const Material checked = checked_material(material);
         World& world = self.core();
         world.set_material(world.change_fixture(self.id), checked);

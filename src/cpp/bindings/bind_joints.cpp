@@ -6,6 +6,7 @@
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
+#include "bindings/named.h"
 #include "bindings/tuples.h"
 #include "world/joints.h"
 
@@ -15,26 +16,25 @@ namespace flatland {
 namespace {
 
 JointBodies joint_bodies(const PyWorld& world, const BodyHandle& body_a, const BodyHandle& body_b,
-                         const PyPoint& anchor_a, const PyPoint& anchor_b, bool collide_connected) {
+                         const Named<PyPoint>& anchor_a, const Named<PyPoint>& anchor_b,
+                         Named<bool> collide_connected) {
+  const PyPoint a = anchor_a.as("anchor_a"), b = anchor_b.as("anchor_b");
   if (body_a.world.core != world.core || body_b.world.core != world.core) {
     throw std::invalid_argument("a joint must connect bodies of its own world");
   }
-  return {body_a.id,
-          body_b.id,
-          {anchor_a[0], anchor_a[1]},
-          {anchor_b[0], anchor_b[1]},
-          collide_connected};
+  return {
+      body_a.id, body_b.id, {a[0], a[1]}, {b[0], b[1]}, collide_connected.as("collide_connected")};
 }
 
 void bind_creation(WorldClass& world) {
   world.def(
       "create_revolute_joint",
       [](const PyWorld& self, const BodyHandle& body_a, const BodyHandle& body_b,
-         const PyPoint& anchor_a, const PyPoint& anchor_b, const std::optional<AngleLimits>& limits,
-         bool collide_connected) {
+         const Named<PyPoint>& anchor_a, const Named<PyPoint>& anchor_b,
+         const Named<std::optional<AngleLimits>>& limits, Named<bool> collide_connected) {
         const JointBodies bodies =
             joint_bodies(self, body_a, body_b, anchor_a, anchor_b, collide_connected);
-        return JointHandle(self, create_revolute_joint(*self.core, bodies, limits));
+        return JointHandle(self, create_revolute_joint(*self.core, bodies, limits.as("limits")));
       },
       py::arg("body_a"), py::arg("body_b"), py::arg("anchor_a"), py::arg("anchor_b"), py::kw_only(),
       py::arg("limits") = py::none(), py::arg("collide_connected") = false, R"(
@@ -61,12 +61,14 @@ Raises:
   world.def(
       "create_weld_joint",
       [](const PyWorld& self, const BodyHandle& body_a, const BodyHandle& body_b,
-         const PyPoint& anchor_a, const PyPoint& anchor_b, double reference_angle, double frequency,
-         double damping, bool collide_connected) {
+         const Named<PyPoint>& anchor_a, const Named<PyPoint>& anchor_b,
+         Named<double> reference_angle, Named<double> frequency, Named<double> damping,
+         Named<bool> collide_connected) {
         const JointBodies bodies =
             joint_bodies(self, body_a, body_b, anchor_a, anchor_b, collide_connected);
         return JointHandle(
-            self, create_weld_joint(*self.core, bodies, reference_angle, frequency, damping));
+            self, create_weld_joint(*self.core, bodies, reference_angle.as("reference_angle"),
+                                    frequency.as("frequency"), damping.as("damping")));
       },
       py::arg("body_a"), py::arg("body_b"), py::arg("anchor_a"), py::arg("anchor_b"), py::kw_only(),
       py::arg("reference_angle") = 0.0, py::arg("frequency") = 0.0, py::arg("damping") = 0.0,
@@ -143,8 +145,8 @@ Raises:
       "Lower and upper angle [rad]; None without limits, and for a weld joint.");
   joint.def(
       "set_limits",
-      [](const JointHandle& self, double lower, double upper) {
-        set_limits(self.core(), self.id, AngleLimits{lower, upper});
+      [](const JointHandle& self, Named<double> lower, Named<double> upper) {
+        set_limits(self.core(), self.id, AngleLimits{lower.as("lower"), upper.as("upper")});
       },
       py::arg("lower"), py::arg("upper"), R"(
 Sets the limits of a revolute joint.

@@ -10,6 +10,7 @@
 
 #include "bindings/bindings.h"
 #include "bindings/controllers.h"
+#include "bindings/named.h"
 #include "bindings/values.h"
 #include "world/bodies.h"
 
@@ -89,8 +90,8 @@ Raises:
 )");
   controller.def(
       "set_target",
-      [](const TricycleHandle& self, double linear, double angular) {
-        set_command(changed_controller(self), {linear, 0.0, angular});
+      [](const TricycleHandle& self, Named<double> linear, Named<double> angular) {
+        set_command(changed_controller(self), {linear.as("linear"), 0.0, angular.as("angular")});
       },
       py::arg("linear"), py::arg("angular"), R"(
 Sets the command, from the next step on.
@@ -160,12 +161,15 @@ Raises:
 )");
   controller.def(
       "set_target",
-      [](const AckermannHandle& self, double speed, double angular, double acceleration,
-         double steering_velocity) {
-        set_command(changed_controller(self), {speed, 0.0, angular});
+      [](const AckermannHandle& self, Named<double> speed, Named<double> angular,
+         Named<double> acceleration, Named<double> steering_velocity) {
+        const double forward = speed.as("speed"), angle = angular.as("angular");
+        const double change = acceleration.as("acceleration");
+        const double turning = steering_velocity.as("steering_velocity");
+        set_command(changed_controller(self), {forward, 0.0, angle});
         auto& motion = motion_of<AckermannMotion>(self);
-        motion.acceleration = std::fabs(acceleration);
-        motion.steering_velocity = std::fabs(steering_velocity);
+        motion.acceleration = std::fabs(change);
+        motion.steering_velocity = std::fabs(turning);
       },
       py::arg("speed"), py::arg("angular"), py::arg("acceleration") = 0.0,
       py::arg("steering_velocity") = 0.0, R"(

@@ -10,9 +10,10 @@
 //   right_of_way.cpp  who passes a door first, and on which side people pass each other
 //   giving_way.cpp    who makes room for whom
 //   motion.cpp        the velocity by a model, free of contacts, and the motion of the legs
-// redraw.cpp contains the first places of people. Parts without a state: flow_field and ways (ways
-// on a grid), walls and surroundings (what is avoided), gates (doors), segment_grid (walls and
-// doors near a place), social_force and orca with half_planes (the models), gait (legs), random.
+// redraw.cpp contains the first places of people. Parts without a state: region (which part of the
+// world the crowd covers), flow_field and ways (ways on a grid), walls and surroundings (what is
+// avoided), gates (doors), segment_grid (walls and doors near a place), social_force and orca with
+// half_planes (the models), gait (legs), random.
 #pragma once
 
 #include <algorithm>
