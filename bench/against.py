@@ -28,11 +28,11 @@ Select = Callable[[str], bool]  # returns whether a row is selected
 
 
 @contextlib.contextmanager
-def worker(version: Version, row: str) -> Iterator[Measure]:
-    """Runs a process that measures a row of `work.py`."""
+def worker(version: Version, row: str, office: Path) -> Iterator[Measure]:
+    """Runs a process that measures a row of `work.py` with the files of an office."""
     process = subprocess.Popen(
         [sys.executable, work.__file__, row],
-        env={**os.environ, **version.variables},
+        env={**os.environ, **version.variables, work.OFFICE_VARIABLE: str(office)},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -55,7 +55,8 @@ def works(versions: Pair, turns: int, selected: Select) -> Iterator[Comparison]:
     """Measures work without ROS."""
     for row in filter(selected, work.ROWS):
         this, reference = versions
-        with worker(this, row) as first, worker(reference, row) as second:
+        office = reference.office
+        with worker(this, row, office) as first, worker(reference, row, office) as second:
             yield Comparison(row, by_turns(first, second, turns))
 
 
@@ -84,9 +85,9 @@ def nodes(
                     yield Comparison(row, by_turns(node.measure, other.measure, turns))
 
 
-def world_paths() -> list[Path]:
+def world_paths(office: Path) -> list[Path]:
     """Returns the benchmark world and the office of the reference simulator, and our office."""
-    paths = [benchmark_world_path(), work.OFFICE / "world.yaml"]
+    paths = [benchmark_world_path(), office / "world.yaml"]
     shared = shared_dir()
     if shared is not None:
         paths.append(shared / "worlds" / "conestogo_office_test" / "world.yaml")
@@ -109,7 +110,7 @@ def main() -> int:
     versions = installed(), build(options.ref)
     measured = [works(versions, options.turns, selected)]
     with contextlib.ExitStack() as stack:
-        for path in world_paths():
+        for path in world_paths(versions[1].office):
             world = stack.enter_context(quiet(path))
             measured.append(nodes(versions, path.parent.name, world, options.turns, selected))
         rows = []

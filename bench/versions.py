@@ -40,6 +40,11 @@ class Version:
             "ROS_PACKAGE_PATH": f"{base}/share:/usr/share",
         }
 
+    @property
+    def office(self) -> Path:
+        """The folder of the bundled office."""
+        return self.prefix / "share" / "flatland" / "worlds" / "office"
+
 
 def installed() -> Version:
     """Returns the version that `make setup` has installed."""
